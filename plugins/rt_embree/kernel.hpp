@@ -188,6 +188,55 @@ struct Camera {
     float world_from_camera[9]; // column-major
 };
 
+// Of the surface that the ray through the centre of a pixel meets, for the denoiser.
+enum GuideRow : int {
+    position_guide,                    // three rows: mm, in world axes
+    normal_guide = position_guide + 3, // three rows: unit vector
+    albedo_guide = normal_guide + 3,   // three rows: the factor of the denoised light
+    surface_guide = albedo_guide + 3,  // an int's bits: number of the surface (surface_of() in guides.inl); 0: none
+    guide_rows
+};
+
+// The denoised light of a surface: the radiance of a virtual one divided by its albedo, or the change of a catcher.
+enum LightRow : int {
+    variance_light = 3, // of the luminance of the three rows before
+    light_rows
+};
+
+// The memory of the denoiser: one value per pixel.
+enum HistoryRow : int {
+    moment_history = 3, // two rows: means of the luminance of the light and of its square; the light precedes
+    distance_history = moment_history + 2, // mm, from the camera to the surface
+    normal_history,                        // an int's bits: packed_normal()
+    surface_history,                       // as surface_guide
+    frames_history,                        // number of frames in the means
+    history_rows
+};
+
+// Images have rows of `stride` values, a multiple of 16. Guides and light have Denoising::margin more values on both
+// sides of a row, without a surface.
+struct Denoising {
+    static constexpr std::int32_t margin = 16;
+    static constexpr std::size_t most_objects = (1u << 18) - 2; // limit of surface_of()
+    std::int32_t width, height, stride;                         // px
+    float *guides[guide_rows];
+    float *light[2][light_rows];       // each step of the filter reads one and writes the other
+    unsigned *taps;                    // of pixels at edges: see tap_count in denoise.inl
+    const float *before[history_rows]; // of the previous frame; NULL: there is none
+    float *after[history_rows];
+    Camera camera_before;
+    bool camera_moved;
+    float pixel_angle; // width of a pixel in the middle of the image, in units of its distance
+    float most_frames; // that count in the means
+    // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels.
+    std::int32_t catcher_phase;
+    std::uint32_t first_random_of_catchers; // as Frame::first_random
+    // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
+    // axes. NULL if no placement has changed.
+    const float *before_from_now;
+    std::int32_t guide_stride() const { return stride + 2 * margin; }
+};
+
 struct Frame {
     Scene scene;
     Rays rays;
@@ -204,6 +253,7 @@ struct Frame {
     std::uint16_t *linear;
     std::uint32_t first_random; // offset into the random sequences of the path integrator
     PathScene path;
+    const Denoising *denoising; // NULL: off
     bool blends_codes; // straight images of the path integrator: the host blends sRGB codes, not linear light
     // Called on any thread after each sample of a tile and before each chunk of photons, because a tile may take
     // seconds. Reports progress; returns whether the image is still wanted.
@@ -234,12 +284,21 @@ struct RayQueue {
     std::int32_t count, capacity;
 };
 
+// Rays through the centres of pixels to catchers that wait to be sampled.
+struct DeferredCatchers {
+    static constexpr int rows = 4; // direction, and the pixel's number in the tile (an int's bits)
+    float *values[rows];
+    std::int32_t count;
+};
+
 // A thread's working memory for one tile. The arrays have one value per pixel, in the order of Rays::blocks.
 struct Scratch {
     // Results of the current sample, per colour channel: plane_count planes of tile_pixels each.
     float *radiance[3];
     float *sum[sum_rows]; // sums over all samples
-    RayQueue *queues;     // one queue per depth, from 0 to Scene::max_depth
+    float *guide[guide_rows];
+    DeferredCatchers deferred;
+    RayQueue *queues; // one queue per depth, from 0 to Scene::max_depth
 };
 
 // Renders a tile. Returns the bounding rectangle of the pixels with non-zero alpha, enlarged to whole blocks of 4×4
@@ -250,9 +309,18 @@ using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &
 using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint32_t count,
                               arhost::raytracer_common::Photon *to);
 
+// A step of the denoiser on one row of the image, or on one tile. `pass`: of the filter.
+using DenoiseRow = void (*)(const Frame &frame, std::int32_t row, int pass);
+using DenoiseTile = void (*)(const Frame &frame, const Tile &tile);
+// Writes a row of the image. Returns the bounding rectangle of the pixels that virtual objects affect.
+using ResolveRow = Rectangle (*)(const Frame &frame, std::int32_t row, int passes);
+
 struct Kernel {
     RenderTile render_tile, render_path_tile;
     TracePhotons trace_photons;
+    DenoiseRow accumulate_row, filter_row;
+    DenoiseTile find_taps;
+    ResolveRow resolve_row;
     const char *name;
 };
 
@@ -261,18 +329,30 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
                    arhost::raytracer_common::Photon *to);
+void accumulate_row(const Frame &frame, std::int32_t row, int);
+void filter_row(const Frame &frame, std::int32_t row, int pass);
+void find_taps(const Frame &frame, const Tile &tile);
+Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
 } // namespace base
 namespace avx2 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
                    arhost::raytracer_common::Photon *to);
+void accumulate_row(const Frame &frame, std::int32_t row, int);
+void filter_row(const Frame &frame, std::int32_t row, int pass);
+void find_taps(const Frame &frame, const Tile &tile);
+Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
 } // namespace avx2
 namespace avx512 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
                    arhost::raytracer_common::Photon *to);
+void accumulate_row(const Frame &frame, std::int32_t row, int);
+void filter_row(const Frame &frame, std::int32_t row, int pass);
+void find_taps(const Frame &frame, const Tile &tile);
+Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
 } // namespace avx512
 
 } // namespace rt_embree

@@ -19,6 +19,11 @@ public:
         settings_.robust = options.boolean("robust");
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
+        settings_.denoise = options.boolean("denoise");
+        if (settings_.accumulate && settings_.denoise)
+            throw arhost::Failure(
+                ARHOST_STATUS_ERROR_CONFIGURATION,
+                "the options 'accumulate' and 'denoise' exclude each other; set one of them to false");
         settings_.single_path = options.text("glass") == "path";
         settings_.photons = static_cast<std::uint32_t>(options.integer("photons"));
         if (const double bound = options.real("max_radiance"); bound > 0)
@@ -35,13 +40,18 @@ public:
                    std::to_string(setup.scene->objects.count) + " objects, " +
                    std::to_string(renderer_->thread_count()) + " threads, instruction set " +
                    renderer_->kernel_name());
+        if (settings_.denoise && renderer_->state_size() == 0)
+            host_.info(
+                "the option 'denoise' has no effect: the scene has the integrator 'whitted', a glossy catcher, or "
+                "too many objects");
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
-        const bool has_video = request.struct_size >= sizeof request; // an older host's struct lacks the field
-        const Rectangle drawn = renderer_->render(request.camera, image, request.motion,
-                                                  has_video ? request.video : nullptr, request.sequence);
+        const bool is_complete = request.struct_size >= sizeof request; // an older host's struct lacks fields
+        const Rectangle drawn = renderer_->render(
+            request.camera, image, request.motion, is_complete ? request.video : nullptr, request.sequence,
+            is_complete ? StateSlots{request.state_before, request.state_after} : StateSlots{});
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
             info.region_x = static_cast<std::uint32_t>(drawn.x0);
@@ -60,6 +70,8 @@ public:
         else
             renderer_->set_light_samples(static_cast<std::int32_t>(changed.integer("light_samples")));
     }
+
+    std::uint64_t state_size() const { return renderer_->state_size(); }
 
     void stop() { renderer_.reset(); }
 
@@ -88,6 +100,8 @@ constexpr arhost_option_descriptor options[] = {
                    "Path integrator: bound of each sample's radiance, in multiples of white, so that single bright "
                    "paths make no fireflies; 0: none.",
                    0, 1e6),
+    arhost::option(ARHOST_OPTION_BOOL, "denoise", "false",
+                   "Path integrator: denoise, with the light of earlier frames."),
     arhost::option(ARHOST_OPTION_INTEGER, "photons", "16384",
                    "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
                    "0: none.",

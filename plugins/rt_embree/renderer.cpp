@@ -105,12 +105,15 @@ Kernel choose_kernel(const std::string &instruction_set) {
 #if defined(__x86_64__)
     if (requested("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
-        return {avx512::render_tile, avx512::render_path_tile, avx512::trace_photons, "avx512"};
+        return {avx512::render_tile, avx512::render_path_tile, avx512::trace_photons, avx512::accumulate_row,
+                avx512::filter_row,  avx512::find_taps,        avx512::resolve_row,   "avx512"};
     if (requested("avx2") && __builtin_cpu_supports("avx2"))
-        return {avx2::render_tile, avx2::render_path_tile, avx2::trace_photons, "avx2"};
+        return {avx2::render_tile, avx2::render_path_tile, avx2::trace_photons, avx2::accumulate_row,
+                avx2::filter_row,  avx2::find_taps,        avx2::resolve_row,   "avx2"};
 #endif
     if (requested("base"))
-        return {base::render_tile, base::render_path_tile, base::trace_photons, "base"};
+        return {base::render_tile, base::render_path_tile, base::trace_photons, base::accumulate_row,
+                base::filter_row,  base::find_taps,        base::resolve_row,   "base"};
     throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                   "option 'instruction_set': this processor or this build of rt_embree does not support '" +
                       instruction_set + "'; use 'auto'");
@@ -121,8 +124,9 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     // scatter two. All other queues hold fewer than three packets (trace_queued_rays() in scatter.inl). Whole packets
     // are read even from partly filled queues, so each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
-    constexpr int pixel_rows = plane_count * 3 + sum_rows;
+    constexpr int pixel_rows = plane_count * 3 + sum_rows + guide_rows;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
+                    std::size_t{DeferredCatchers::rows} * (tile_pixels / 4 + packet) +
                     std::size_t{RayQueue::rows} * (first_capacity + std::size_t{max_depth} * capacity));
     float *next = storage_.data();
     const auto take = [&](std::int32_t count) { return std::exchange(next, next + count); };
@@ -130,6 +134,10 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
         row = take(plane_count * tile_pixels);
     for (float *&row : scratch_.sum)
         row = take(tile_pixels);
+    for (float *&row : scratch_.guide)
+        row = take(tile_pixels);
+    for (float *&row : scratch_.deferred.values)
+        row = take(tile_pixels / 4 + packet);
     for (std::uint32_t depth = 0; depth <= max_depth; ++depth) {
         const std::int32_t size = depth == 0 ? first_capacity : capacity;
         queues_[depth] = {take(RayQueue::rows * size), 0, size};
@@ -157,6 +165,9 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         irradiance_ = arhost::raytracer_common::environment_irradiance(*setup.scene);
         place_lights();
     }
+    if (settings.denoise && lights_ && !scene_.view().has_gloss &&
+        setup.scene->objects.count <= Denoising::most_objects)
+        denoiser_.emplace(full_intrinsics_.width, full_intrinsics_.height, setup.scene->objects.count);
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
     if (settings.accumulate)
@@ -258,10 +269,8 @@ PathScene Renderer::path_scene() const {
     path.sphere_count = static_cast<std::int32_t>(lights_->spheres().size());
     path.max_radiance = max_radiance_;
     path.least_irradiance = lights_->least_irradiance(has_video_ ? &video_ : nullptr);
-    if (!has_video_)
-        return path;
     const arhost_intrinsics &of = full_intrinsics_;
-    path.video.image = {video_.texels(),
+    path.video.image = {has_video_ ? video_.texels() : nullptr,
                         static_cast<std::int32_t>(of.width),
                         static_cast<std::int32_t>(of.height),
                         ARHOST_TEXEL_SRGB8,
@@ -280,7 +289,7 @@ PathScene Renderer::path_scene() const {
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion,
-                           const arhost_frame *video, std::uint64_t sequence) {
+                           const arhost_frame *video, std::uint64_t sequence, const StateSlots &state) {
     set_size(camera);
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
     const Pose pose(camera);
@@ -330,12 +339,17 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 image.linear,
                 first_random,
                 path_scene(),
+                nullptr,
                 blends_codes_,
                 [](const void *of) { return static_cast<const Progress *>(of)->goes_on(); },
                 &progress};
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
+    if (denoiser_ && state.after)
+        frame.denoising = &denoiser_->begin(state, intrinsics_, frame.camera, scene_.placed_objects(),
+                                            motion && motion->deformed_count > 0,
+                                            static_cast<std::uint32_t>(sequence), full_samples_);
     if (lights_)
         trace_photons(frame);
     const RenderTile render_tile = lights_ ? kernel_.render_path_tile : kernel_.render_tile;
@@ -347,7 +361,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             return ray_table_.window(i).intersects(window);
         });
         if (!visible || host_.cancelled())
-            return clear(image, tile.pixels);
+            return frame.denoising ? denoiser_->clear(tile) : clear(image, tile.pixels);
         const Rectangle part = render_tile(frame, tile, *scratch_[thread]);
         progress.finish_tile();
         if (part.x0 < part.x1) {
@@ -358,6 +372,12 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (host_.cancelled()) {
         history_camera_.reset(); // the sums are incomplete
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while tracing the image");
+    }
+    if (frame.denoising) {
+        drawn = denoiser_->run(frame, kernel_, tiles, threads_);
+        if (host_.cancelled())
+            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while denoising the image");
+        return drawn;
     }
     if (!history_.empty())
         history_samples_ += static_cast<std::uint32_t>(samples_.size());

@@ -3,6 +3,7 @@
 // Renders an image: selects the tiles in which objects can be visible, and distributes them over threads.
 #pragma once
 
+#include "denoiser.hpp"
 #include "embree_scene.hpp"
 #include "ray_table.hpp"
 #include "raytracer_common/photon_map.hpp"
@@ -28,6 +29,7 @@ struct Settings {
     float max_radiance = 100;        // path integrator: bound of each sample; infinity: none
     std::uint32_t photons = 1 << 14; // path integrator: light rays from lamps per frame and sample, for caustics
     std::string instruction_set = "auto";
+    bool denoise = false; // path integrator
 };
 
 // Owns the memory of a thread's `Scratch`.
@@ -48,9 +50,11 @@ public:
 
     // Returns a rectangle that contains all pixels that virtual objects affect; if there are none, it has x1 <= x0.
     // `motion` is NULL if nothing has moved since the last call, `video` if the frame under the overlay is unknown.
-    // `sequence`: number of the frame, for the random numbers of the path integrator.
+    // `sequence`: number of the frame, for the random numbers of the path integrator. `state`: of state_size() bytes;
+    // without it, there is no denoising.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr,
-                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0);
+                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0, const StateSlots &state = {});
+    std::uint64_t state_size() const { return denoiser_ ? denoiser_->state_size() : 0; }
     const EmbreeScene &scene() const { return scene_; }
     // Both functions change the images of later calls as if the renderer had been created with the new setting.
     // `full_samples`: number of samples of an image without a limit (arhost_render_request.max_samples).
@@ -93,6 +97,7 @@ private:
     arhost::raytracer_common::VideoImage video_;
     bool has_video_ = false; // of the current frame
     float max_radius_squared_;
+    std::optional<Denoiser> denoiser_; // empty without denoising
 
     // State of the option `accumulate`.
     std::vector<float> history_;                  // sums of the samples so far; empty if the option is off

@@ -38,12 +38,13 @@ ARHOST_INLINE Vec3 load_rays(const float *arrays, std::int32_t dimensions, float
     return {load(arrays), load(arrays + lanes), dimensions == 3 ? load(arrays + 2 * lanes) : Float(z)};
 }
 
-ARHOST_INLINE Vec3 direction_in_world(const Frame &frame, const float *rays, std::uint32_t sample) {
+// Returns the ray directions of a block, in world axes, through points that are (x, y) px from the pixels' centres.
+ARHOST_INLINE Vec3 direction_in_world(const Frame &frame, const float *rays, float x, float y) {
     const std::int32_t dimensions = frame.rays.dimensions, step = lanes * dimensions;
     Vec3 direction = load_rays(rays, dimensions, 1);
     if (frame.rays.has_derivatives)
-        direction = direction + load_rays(rays + step, dimensions, 0) * Float(frame.samples[sample].x) +
-                    load_rays(rays + 2 * step, dimensions, 0) * Float(frame.samples[sample].y);
+        direction = direction + load_rays(rays + step, dimensions, 0) * Float(x) +
+                    load_rays(rays + 2 * step, dimensions, 0) * Float(y);
     return transform(frame.camera.world_from_camera, direction);
 }
 
@@ -164,12 +165,14 @@ template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use
             use(index, x, y, all.x1 - x < block ? all.x1 - x : block, all.y1 - y < block ? all.y1 - y : block);
 }
 
-#include "path.inl"
+#include "denoise.inl"
 
 struct Whitted {
-    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, Bool active) {
+    template <class DirectionAt>
+    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, DirectionAt, Bool active) {
         return trace_primary_and_shade(work, first_pixel, direction, active);
     }
+    static ARHOST_INLINE void finish_primary(Work &) {}
     static ARHOST_INLINE void trace_packet(Work &work, std::uint32_t depth) { trace_queued_packet(work, depth); }
     static ARHOST_INLINE void accumulate(const Frame &, Scratch &scratch, int first_pixel) {
         accumulate_radiance(scratch, first_pixel);
@@ -183,8 +186,14 @@ struct Whitted {
 };
 
 struct Path {
-    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, Bool active) {
-        return primary_path(work, first_pixel, direction, active);
+    template <class DirectionAt>
+    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, DirectionAt direction_at,
+                                      Bool active) {
+        return primary_path(work, first_pixel, direction, direction_at, active);
+    }
+    static ARHOST_INLINE void finish_primary(Work &work) {
+        if (work.scratch.deferred.count > 0)
+            sample_deferred_catchers(work);
     }
     static ARHOST_INLINE void trace_packet(Work &work, std::uint32_t depth) { trace_path_packet(work, depth); }
     static ARHOST_INLINE void accumulate(const Frame &frame, Scratch &scratch, int first_pixel) {
@@ -192,6 +201,10 @@ struct Path {
     }
     static ARHOST_INLINE bool write(const Frame &frame, const Scratch &scratch, int first_pixel, std::uint32_t count,
                                     int x, int y, int width, int height) {
+        if (frame.denoising) {
+            write_for_denoiser(frame, scratch, first_pixel, count, x, y, width, height);
+            return false;
+        }
         const LinearBlock linear = linear_mean(frame, scratch, first_pixel, count, x, y);
         if (frame.linear)
             return write_linear(frame, x, y, width, height, linear);
@@ -207,20 +220,31 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     const Rectangle &all = tile.pixels;
     Rectangle drawn{all.x1, all.y1, all.x0, all.y0};
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
-    Work work{frame, scratch, 0,
-              (static_cast<std::uint32_t>(all.x0) * 65536u + static_cast<std::uint32_t>(all.y0)) ^ 0x51ed270bu, 0};
+    Work work{frame, scratch,
+              0,     (static_cast<std::uint32_t>(all.x0) * 65536u + static_cast<std::uint32_t>(all.y0)) ^ 0x51ed270bu,
+              0,     0};
     bool has_light[tile_pixels / lanes];
     for (int i = 0; i < frame.scene.sum_row_count(); ++i)
         __builtin_memset(scratch.sum[i], 0, tile_pixels * sizeof(float));
+    if (frame.denoising)
+        for (float *guide : scratch.guide)
+            __builtin_memset(guide, 0, tile_pixels * sizeof(float));
 
     for (std::int32_t i = 0; i < frame.sample_count; ++i) {
-        work.sample = frame.first_random + static_cast<std::uint32_t>(i);
+        work.index = static_cast<std::uint32_t>(i);
+        work.sample = frame.first_random + work.index;
         for_each_block(all, [&](int number, int, int, int width, int height) {
-            const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), i);
+            const float *block_rays = rays + number * frame.rays.block_size();
+            const auto direction_at = [&](float x, float y) __attribute__((always_inline)) {
+                return direction_in_world(frame, block_rays, x, y);
+            };
+            const Vec3 direction =
+                frame.denoising ? direction_at(0, 0) : direction_at(frame.samples[i].x, frame.samples[i].y);
             const Bool inside =
                 inside_block(width, height) & (direction.x == direction.x); // false if NaN: the pixel has no ray
-            has_light[number] = Integrator::primary(work, number * lanes, direction, inside);
+            has_light[number] = Integrator::primary(work, number * lanes, direction, direction_at, inside);
         });
+        Integrator::finish_primary(work);
         trace_queued_rays(work, [](Work &of, std::uint32_t depth) { Integrator::trace_packet(of, depth); });
         for_each_block(all, [&](int number, int, int, int, int) {
             if (has_light[number])
@@ -258,6 +282,22 @@ void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
                    arhost::raytracer_common::Photon *to) {
     for (std::uint32_t i = 0; i < count; i += lanes)
         trace_photon_packet(frame, first + i, to + i, lane_numbers() < Int(static_cast<int>(count - i)));
+}
+
+void accumulate_row(const Frame &frame, std::int32_t row, int) {
+    accumulate(frame, row);
+}
+
+void filter_row(const Frame &frame, std::int32_t row, int pass) {
+    filter(frame, row, pass);
+}
+
+void find_taps(const Frame &frame, const Tile &tile) {
+    find_taps_of(frame, tile);
+}
+
+Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes) {
+    return resolve(frame, row, passes);
 }
 
 } // namespace rt_embree::ARHOST_ISA

@@ -23,6 +23,9 @@
 namespace rt_embree::ARHOST_ISA {
 
 #define ARHOST_INLINE inline __attribute__((always_inline))
+// A large function with several callers. Packets are passed by reference: how they are passed by value depends on the
+// instruction set.
+#define ARHOST_FUNCTION __attribute__((noinline))
 
 inline constexpr int lanes = 16;
 #if defined(__AVX512F__)

@@ -6,7 +6,7 @@
 // objects, or the change of the light that it mirrors (Debevec, Rendering Synthetic Objects into Real Scenes,
 // SIGGRAPH 1998; residual path integrals, arXiv 2406.16302).
 #pragma once
-#include "path_catcher.inl"
+#include "guides.inl"
 #include "photons.inl"
 
 // Paths of fewer bounces are not ended at random.
@@ -96,8 +96,10 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
 }
 
 // Adds the light that the hit surfaces send towards the rays' origins, and queues the rays that they scatter.
-ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, Paths paths) {
+ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool &hit, const Paths &from) {
     const Scene &scene = work.frame.scene;
+    Bool active = hit;
+    Paths paths = from;
     const Surface s = surface_at(scene, rays, active);
     const Vec3 direction = normalize(direction_of(rays.ray));
     if (paths.depth > 0)
@@ -156,8 +158,62 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
         shade_path(work, rays, hit, next.paths);
 }
 
+// Keeps the rays to the catchers that are sampled in this frame: one of each 2×2 pixels.
+ARHOST_INLINE void defer_catchers(Work &work, Vec3 direction, Int pixel, Bool caught) {
+    const int phase = work.frame.denoising->catcher_phase;
+    const Int odd = (lane_numbers() & Int(1)) | ((lane_numbers() >> Int(1)) & Int(2)); // column, row in 2×2 pixels
+    const Bool chosen = caught & (odd == Int(phase));
+    alignas(64) float by_lane[DeferredCatchers::rows][lanes];
+    const Float values[] = {direction.x, direction.y, direction.z, float_of(pixel)};
+    for (int row = 0; row < DeferredCatchers::rows; ++row)
+        store(by_lane[row], values[row]);
+    DeferredCatchers &deferred = work.scratch.deferred;
+    for (unsigned remaining = mask_of(chosen.lane); remaining; remaining &= remaining - 1, ++deferred.count)
+        for (int row = 0; row < DeferredCatchers::rows; ++row)
+            deferred.values[row][deferred.count] = by_lane[row][__builtin_ctz(remaining)];
+}
+
+// Samples the deferred catchers in full packets. Their random numbers have a sequence of their own at this vertex, as
+// each pixel is sampled in every fourth frame only.
+ARHOST_INLINE void sample_deferred_catchers(Work &work) {
+    DeferredCatchers &deferred = work.scratch.deferred;
+    const std::uint32_t sample = work.sample;
+    work.sample = work.frame.denoising->first_random_of_catchers + work.index;
+    for (std::int32_t first = 0; first < deferred.count; first += lanes) {
+        const Bool active = lane_numbers() < Int(deferred.count - first);
+        const auto row = [&](int i) __attribute__((always_inline)) {
+            return load(deferred.values[i] + first);
+        };
+        const PrimaryHits hits =
+            trace_primary(work.frame.scene, splat(work.frame.camera.eye), {row(0), row(1), row(2)}, active);
+        const Paths paths{select(active, bits_of(row(3)), Int(0)), -1, white(), 0, Float(0.0f)};
+        if (any(hits.caught))
+            change_catcher(work, in_plane(paths, change_plane), hits.catcher_rays, hits.caught);
+    }
+    deferred.count = 0;
+    work.sample = sample;
+}
+
+// Shades pixels that show mirrors and glass away from their centres, so that edges of what these show become smooth
+// over frames.
+template <class DirectionAt>
+ARHOST_INLINE void shade_specular(Work &work, const PrimaryHits &centre, const Paths &paths, DirectionAt direction_at,
+                                  Bool active) {
+    const Scene &scene = work.frame.scene;
+    const arhost::raytracer_common::Sample &at = work.frame.samples[work.index];
+    const PrimaryHits near = trace_primary(scene, splat(work.frame.camera.eye), direction_at(at.x, at.y), active);
+    const Bool same =
+        near.is_virtual & (object_number(scene, near.rays.hit) == object_number(scene, centre.rays.hit));
+    if (any(same))
+        shade_path(work, near.rays, same, paths);
+    if (const Bool missed = active & ~same; any(missed))
+        shade_path(work, centre.rays, missed, paths);
+}
+
 // Traces the primary rays of a block and shades their hits. Returns whether any pixel can be affected.
-ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Bool active) {
+// `direction_at`: (x, y) px from the pixels' centres.
+template <class DirectionAt>
+ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, DirectionAt direction_at, Bool active) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
     const int planes_used = scene.has_gloss ? plane_count : mirrored_plane;
@@ -165,13 +221,26 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Boo
         for (int plane = 0; plane < planes_used; ++plane)
             store(planes + plane * tile_pixels + first_pixel, Float(0.0f));
     const PrimaryHits hits = trace_primary(scene, eye, direction, active);
+    if (work.frame.denoising && work.index == 0)
+        store_guides(work, hits, direction, first_pixel);
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
-    if (any(hits.caught))
+    if (work.frame.denoising && work.frame.denoising->catcher_phase >= 0)
+        defer_catchers(work, direction, paths.pixel, hits.caught);
+    else if (any(hits.caught))
         change_catcher(work, in_plane(paths, change_plane), hits.catcher_rays, hits.caught);
     if (!any(hits.is_virtual))
         return any(hits.caught);
     add_to_sum(work.scratch, coverage_row, first_pixel, select(hits.is_virtual, Float(1.0f), Float(0.0f)));
-    shade_path(work, hits.rays, hits.is_virtual, paths);
+    Bool rest = hits.is_virtual;
+    if (work.frame.denoising) {
+        const Bool specular =
+            rest & is_kind(bits_of(load(work.scratch.guide[surface_guide] + first_pixel)), specular_surface);
+        rest = rest & ~specular;
+        if (any(specular))
+            shade_specular(work, hits, paths, direction_at, specular);
+    }
+    if (any(rest))
+        shade_path(work, hits.rays, rest, paths);
     return true;
 }
 
@@ -243,6 +312,13 @@ ARHOST_INLINE void remove_covered(const Frame &frame, Vec3 covered, Vec3 matt, i
                                     remaining(covered.z, matt.z, video.z)};
 }
 
+ARHOST_INLINE Vec3 bounded_for_halves(Vec3 a) {
+    const auto bounded = [](Float value) __attribute__((always_inline)) {
+        return min(max(value, Float(0.0f)), Float(65504.0f));
+    };
+    return {bounded(a.x), bounded(a.y), bounded(a.z)};
+}
+
 ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch, int first_pixel,
                                       std::uint32_t count, int x, int y) {
     const Float samples(static_cast<float>(count));
@@ -255,11 +331,7 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
     if (frame.scene.has_catchers)
         linear.transmittance =
             linear.transmittance + Vec3{mean(change_row), mean(change_row + 1), mean(change_row + 2)};
-    const auto bounded = [](Float a) __attribute__((always_inline)) {
-        return min(max(a, Float(0.0f)), Float(65504.0f));
-    };
-    linear.transmittance = {bounded(linear.transmittance.x), bounded(linear.transmittance.y),
-                            bounded(linear.transmittance.z)};
+    linear.transmittance = bounded_for_halves(linear.transmittance);
     if (frame.scene.has_gloss) {
         const Float share = Float(1.0f) / max(uncovered, Float(1e-3f));
         const auto mean_behind = [&](int row) __attribute__((always_inline)) {
@@ -267,13 +339,13 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
         };
         remove_covered(frame, mean_behind(covered_row), mean_behind(matt_row), x, y, linear);
     }
-    linear.added = {bounded(linear.added.x), bounded(linear.added.y), bounded(linear.added.z)};
+    linear.added = bounded_for_halves(linear.added);
     return linear;
 }
 
 // Writes a block of the image. Returns whether virtual objects affect any of its pixels.
-ARHOST_INLINE bool write_linear(const Frame &frame, int x, int y, int width, int height,
-                                const LinearBlock &block_of) {
+ARHOST_INLINE bool write_linear(const Frame &frame, int x, int y, int width, int height, const LinearBlock &block_of,
+                                int lanes_per_row = block) {
     alignas(64) int halves[6][lanes];
     const Float values[] = {block_of.added.x,         block_of.added.y,         block_of.added.z,
                             block_of.transmittance.x, block_of.transmittance.y, block_of.transmittance.z};
@@ -289,12 +361,12 @@ ARHOST_INLINE bool write_linear(const Frame &frame, int x, int y, int width, int
                    std::size_t{8} * x;
         for (int column = 0; column < width; ++column, to += 8)
             for (int i = 0; i < 3; ++i) {
-                to[i] = static_cast<std::uint16_t>(halves[i][block * row + column]);
-                to[4 + i] = static_cast<std::uint16_t>(halves[3 + i][block * row + column]);
+                to[i] = static_cast<std::uint16_t>(halves[i][lanes_per_row * row + column]);
+                to[4 + i] = static_cast<std::uint16_t>(halves[3 + i][lanes_per_row * row + column]);
                 to[3] = to[7] = 0;
             }
     }
-    return any(affected & inside_block(width, height));
+    return any(affected & (lanes_per_row == block ? inside_block(width, height) : lane_numbers() < Int(width)));
 }
 
 ARHOST_INLINE Int straight_of(const Frame &frame, const LinearBlock &linear) {

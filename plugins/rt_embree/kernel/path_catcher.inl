@@ -8,7 +8,8 @@
 // Returns paths whose radiance is added to another plane. The planes also have different random numbers.
 ARHOST_INLINE Paths in_plane(Paths paths, Plane plane) {
     paths.pixel = (paths.pixel & Int(tile_pixels - 1)) + Int(plane * tile_pixels);
-    paths.first_pixel = (paths.first_pixel & (tile_pixels - 1)) + plane * tile_pixels;
+    if (paths.first_pixel >= 0)
+        paths.first_pixel = (paths.first_pixel & (tile_pixels - 1)) + plane * tile_pixels;
     return paths;
 }
 ARHOST_INLINE Bool changes_catcher(const Paths &paths) {
@@ -192,8 +193,8 @@ ARHOST_INLINE Vec3 sampled_change(const Work &work, const Paths &paths, const Su
             changed = hidden;
             if (may_be_hidden && any(hidden))
                 changed = is_visible(frame.scene, s, sample, Int(real_masks), hidden);
-            // In front of a lamp, real objects already cast a shadow in the video. The environment shows them, too, so
-            // that virtual objects before them hide its light.
+            // In front of a lamp, real objects already cast a shadow in the video. The environment shows them, too,
+            // so that virtual objects before them hide its light.
             Bool darkened = changed;
             if (const Bool unclear = hidden & ~changed & sample.is_environment; any(unclear))
                 darkened = darkened | is_virtual_first(frame.scene, s, sample, unclear);
@@ -246,7 +247,7 @@ ARHOST_INLINE Vec3 relative_change(const Frame &frame, const Surface &s, Vec3 ir
 
 // Adds the change of a catcher's light, relative to its light without virtual objects. Of its gloss, adds the light
 // that virtual objects add and remove in absolute terms.
-ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHit16 &rays, Bool active) {
+ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRayHit16 &rays, const Bool &active) {
     const Frame &frame = work.frame;
     const Surface s = surface_at(frame.scene, rays, active);
     const Vec3 before = irradiance_without_objects(frame, s);
@@ -299,15 +300,14 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
     enqueue_bounce(work, relative, s, form_factors, relative.throughput, 1, active);
 }
 
-// The light of the video in some direction.
-struct Filmed {
-    Bool inside; // the video shows this direction
-    Vec3 light;
+// The point of the picture that shows a direction: px, texel centres at halves.
+struct PixelOf {
+    Float x, y;
+    Bool in_front; // of the camera, where its lens model is valid
 };
 // `to_point`: from the camera's eye, in world axes.
-ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
-    const Video &video = frame.path.video;
-    const float *m = frame.camera.world_from_camera;
+ARHOST_INLINE PixelOf pixel_towards(const Video &video, const Camera &camera, Vec3 to_point) {
+    const float *m = camera.world_from_camera;
     const Vec3 p{dot(splat(m), to_point), dot(splat(m + 3), to_point), dot(splat(m + 6), to_point)};
     const Float depth = max(p.z, Float(1e-6f));
     Vec3 at = vec3(p.x / depth, p.y / depth, Float(1.0f));
@@ -317,11 +317,22 @@ ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
         at = brown_conrady({k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11]}, at);
     else if (video.distortion == ARHOST_DISTORTION_FISHEYE)
         at = kannala_brandt({k[0], k[1], k[2], k[3]}, at);
-    // Pixel centres are at integers, texel centres at halves.
-    const Float x = at.x * Float(video.fx) + Float(video.cx + 0.5f),
-                y = at.y * Float(video.fy) + Float(video.cy + 0.5f);
+    return {at.x * Float(video.fx) + Float(video.cx + 0.5f), at.y * Float(video.fy) + Float(video.cy + 0.5f),
+            in_front};
+}
+
+// The light of the video in some direction.
+struct Filmed {
+    Bool inside; // the video shows this direction
+    Vec3 light;
+};
+// `to_point`: from the camera's eye, in world axes.
+ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
+    const Video &video = frame.path.video;
+    const PixelOf pixel = pixel_towards(video, frame.camera, to_point);
+    const Float x = pixel.x, y = pixel.y;
     const Float width(static_cast<float>(video.image.width)), height(static_cast<float>(video.image.height));
-    const Bool inside = in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
+    const Bool inside = pixel.in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
     if (!any(inside))
         return {inside, black()};
     return {inside, sample_texture(frame.scene, video.image, x / width, y / height).colour};

@@ -61,8 +61,8 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
     const Float radius = field(radius_row);
     Vec3 origin = position;
     if (any(radius > Float(0.0f)))
-        origin =
-            select(radius > Float(0.0f), centre + vector_to_disc(axis(position - centre), radius, uv.u, uv.v), origin);
+        origin = select(radius > Float(0.0f), centre + vector_to_disc(axis(position - centre), radius, uv.u, uv.v),
+                        origin);
     if (any(rectangle))
         origin = select(rectangle, vector_to_rectangle(position, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v),
                         origin);
@@ -279,7 +279,7 @@ ARHOST_INLINE PhotonLight photon_light(const Work &work, const Paths &paths, con
     if (photons.level_count == 0)
         return sum;
     const std::int32_t step = work.frame.sample_count > 8 ? 4 : 1;
-    if ((work.sample - work.frame.first_random) % static_cast<std::uint32_t>(step) != 0)
+    if (work.index % static_cast<std::uint32_t>(step) != 0)
         return sum;
     const std::int32_t estimates = (work.frame.sample_count + step - 1) / step;
     const Pair random = path_pair(work, paths, photon_dimension);

@@ -8,7 +8,7 @@
 // Pixel and throughput of 16 paths.
 struct Paths {
     Int pixel;                // number of the pixel in the tile, plus tile_pixels · its Plane
-    std::int32_t first_pixel; // pixel of lane 0; valid for primary rays only, whose pixels are consecutive
+    std::int32_t first_pixel; // pixel of lane 0 of primary rays, if their pixels are consecutive; else −1
     Vec3 throughput;
     std::uint32_t depth;   // number of bounces so far
     Float inverse_density; // see RayQueue; 0 for primary rays
@@ -21,6 +21,7 @@ struct Work {
     std::uint32_t deepest; // no queue of a greater depth has rays
     std::uint32_t seed;    // seed of the tile's random numbers
     std::uint32_t sample;  // index of the current sample among all accumulated ones
+    std::uint32_t index;   // among those of the frame
 };
 
 ARHOST_INLINE Random random_of(const Work &work, const Paths &paths) {
@@ -30,7 +31,7 @@ ARHOST_INLINE Random random_of(const Work &work, const Paths &paths) {
 ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, Bool active) {
     const Vec3 arriving = paths.throughput * radiance;
     float *const *to = work.scratch.radiance;
-    if (paths.depth == 0) {
+    if (paths.depth == 0 && paths.first_pixel >= 0) {
         const auto add = [&](int i, Float more) __attribute__((always_inline)) {
             float *at = to[i] + paths.first_pixel;
             store(at, load(at) + select(active, more, Float(0.0f)));

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -92,7 +93,7 @@ private:
     arhost_frame frame_{};
 };
 
-// A ray tracer that renders linear images.
+// A ray tracer that renders linear images, each with the state of the one before.
 class LinearTracer {
 public:
     LinearTracer(scene::ArenaBuilder scene, const Options &options, const std::string &plugin)
@@ -114,8 +115,11 @@ public:
                                            video ? &video->format() : nullptr};
         const arhost_status status = functions().start(tracer_.plugin().instance(), &setup);
         started_ = status == ARHOST_STATUS_OK;
+        state_.clear();
         return status;
     }
+    // The state after the last image.
+    std::span<std::byte> state() { return std::as_writable_bytes(std::span(state_)).first(state_size()); }
     LinearPicture render(const arhost_camera &camera, std::uint64_t sequence = 0, const Video *video = nullptr,
                          std::optional<double> time_s = {}) {
         if (time_s && !motion_)
@@ -123,6 +127,7 @@ public:
         arhost_motion motion{};
         if (time_s)
             motion = motion_->at(*time_s);
+        std::vector<Page> after((state_size() + sizeof(Page) - 1) / sizeof(Page));
         const arhost_render_request request{sizeof request,
                                             0,
                                             sequence,
@@ -130,20 +135,27 @@ public:
                                             camera,
                                             time_s ? &motion : nullptr,
                                             video ? &video->frame() : nullptr,
-                                            nullptr,
-                                            nullptr,
-                                            0,
+                                            state_.empty() ? nullptr : state_.data(),
+                                            after.empty() ? nullptr : after.data(),
+                                            state_size(),
                                             nullptr};
         LinearPicture picture(camera.intrinsics);
         const arhost_image image = picture.image();
         EXPECT_EQ(functions().render(tracer_.plugin().instance(), &request, &image, &picture.info), ARHOST_STATUS_OK)
             << log();
         EXPECT_TRUE(picture.only_pixels_written());
+        state_ = std::move(after);
         return picture;
     }
     std::string log() const { return tracer_.log(); }
 
 private:
+    struct alignas(4096) Page {
+        std::byte bytes[4096];
+    };
+    std::uint64_t state_size() {
+        return functions().state_size ? functions().state_size(tracer_.plugin().instance()) : 0;
+    }
     void stop() {
         if (started_)
             functions().stop(tracer_.plugin().instance());
@@ -153,6 +165,7 @@ private:
 
     Tracer tracer_;
     std::optional<scene::MotionEvaluator> motion_;
+    std::vector<Page> state_;
     bool started_ = false;
 };
 

@@ -1,0 +1,77 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Noise and time of rt_embree's path integrator, with and without `denoise`: tools/bench noise [--quick]. Method:
+bench/noise/README.md."""
+import gzip
+import os
+import shutil
+import subprocess
+import sys
+
+here = os.path.dirname(os.path.abspath(__file__))
+root = os.path.dirname(os.path.dirname(here))
+FOLDER = os.path.join(root, "build", "noise")
+PROGRAM = os.path.join(root, "build", "release", "bin", "render-noise")
+BUNNY = os.path.join(root, "..", "shared", "data", "meshes", "bunny_69451.ply.gz")
+QUICK = "--quick" in sys.argv
+# RMS difference from the converged picture, in codes: after 16 frames of a camera at rest, and while it moves.
+TARGETS = {"still": {"catcher": 2, "diffuse": 2.5, "glossy": 2.5, "mirror, glass": 4},
+           "moving": {"catcher": 4, "diffuse": 5, "glossy": 5, "mirror, glass": 6}}
+LARGEST_FLICKER = 1  # standard deviation over frames of a camera at rest, in codes
+
+
+def scene():
+    """The scene file; with the bunny in place of the red ball, if there is one."""
+    os.makedirs(FOLDER, exist_ok=True)
+    with open(os.path.join(here, "scene.yaml"), encoding="utf-8") as file:
+        text = file.read()
+    if not os.path.exists(BUNNY):
+        print("skipped: the bunny, because ../shared/data is missing")
+    else:
+        with gzip.open(BUNNY) as packed, open(os.path.join(FOLDER, "bunny.ply"), "wb") as mesh:
+            shutil.copyfileobj(packed, mesh)
+        ball = "  - {name: red, sphere: {centre: [-70, 10, 28], radius: 28}, material: red}\n"
+        assert ball in text
+        # The scan is in metres, with y up.
+        text = text.replace(ball, "  - name: bunny\n    mesh: bunny.ply\n    smooth: true\n    material: red\n    transform:\n"
+                            "      - scale: 450\n      - rotate: {axis: [1, 0, 0], degrees: 90}\n"
+                            "      - translate: [-62, 10, -15]\n")
+    path = os.path.join(FOLDER, "scene.yaml")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+    return path
+
+
+def measure(path, title, **keys):
+    """{surface: (RMS, flicker)}"""
+    folder = os.path.join(FOLDER, title)
+    os.makedirs(folder, exist_ok=True)
+    ran = subprocess.run([PROGRAM, path, f"out={folder}", *(f"{key}={value}" for key, value in keys.items())],
+                         stdout=subprocess.PIPE, text=True, check=True)
+    print(f"{title}\n{ran.stdout}", flush=True)
+    rows = {}
+    for line in ran.stdout.splitlines()[1:-1]:
+        words = line.rsplit(maxsplit=3)
+        rows[words[0]] = (float(words[2]), float(words[3]))
+    return rows
+
+
+def main():
+    path = scene()
+    frames = 4 if QUICK else 16
+    reference = 1 if QUICK else 16
+    measure(path, "noisy", denoise=0, frames=frames, reference=1)
+    still = measure(path, "still", frames=frames, reference=reference)
+    moving = measure(path, "moving", frames=24 if not QUICK else frames, orbit=0.5, reference=reference)
+    if QUICK:
+        return 0
+    missed = [f"{name} {title}: RMS {rows[name][0]}, target {target}"
+              for title, rows in (("still", still), ("moving", moving))
+              for name, target in TARGETS[title].items() if rows[name][0] > target]
+    missed += [f"{name}: flicker {flicker}, target {LARGEST_FLICKER}" for name, (_, flicker) in still.items()
+               if flicker > LARGEST_FLICKER]
+    print("\n".join("missed: " + each for each in missed) or "all targets met")
+    return 1 if missed else 0
+
+
+sys.exit(main())

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoiser.hpp"
+
+#include "raytracer_common/scene_geometry.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <mutex>
+#include <utility>
+
+namespace rt_embree {
+namespace {
+
+// The state begins with this, followed by the objects and the rows of the history.
+struct StateHeader {
+    std::uint32_t version, width, height;
+    std::uint32_t first, frames; // number of the history's first frame, and of the frames since
+    Camera camera;
+};
+struct ObjectState {
+    float world_from_object[12];
+    std::uint32_t is_visible;
+};
+constexpr std::uint32_t state_version = 1;
+constexpr std::size_t alignment = 64; // of the rows, bytes
+
+std::size_t aligned(std::size_t size) {
+    return (size + alignment - 1) / alignment * alignment;
+}
+std::size_t rows_offset(std::size_t objects) {
+    return aligned(sizeof(StateHeader) + sizeof(ObjectState) * objects);
+}
+std::size_t stride_of(std::size_t width) {
+    return (width + 15) / 16 * 16;
+}
+std::size_t size_of(std::size_t width, std::size_t height, std::size_t objects) {
+    return rows_offset(objects) + history_rows * sizeof(float) * stride_of(width) * height;
+}
+
+// Writes to · inverse(from): the motion from one placement to another.
+void write_motion(const float *from, const float *to, float *motion) {
+    const arhost::raytracer_common::Cofactors cofactors(from);
+    double linear[9]; // column-major
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) {
+            double sum = 0;
+            for (int i = 0; i < 3; ++i) // inverse(i, column) = cofactor(column, i) / determinant
+                sum += to[3 * i + row] * cofactors.values[3 * i + column];
+            linear[3 * column + row] = sum / cofactors.determinant;
+            motion[3 * column + row] = static_cast<float>(linear[3 * column + row]);
+        }
+    for (int row = 0; row < 3; ++row) {
+        double moved = to[9 + row];
+        for (int i = 0; i < 3; ++i)
+            moved -= linear[3 * i + row] * from[9 + i];
+        motion[9 + row] = static_cast<float>(moved);
+    }
+}
+
+} // namespace
+
+Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects)
+    : objects_(objects), state_size_(size_of(width, height, objects)), motion_(12 * objects) {}
+
+void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
+    denoising_.width = static_cast<std::int32_t>(width);
+    denoising_.height = static_cast<std::int32_t>(height);
+    denoising_.stride = static_cast<std::int32_t>(stride_of(width));
+    const std::size_t plane = static_cast<std::size_t>(denoising_.guide_stride()) * height;
+    planes_.assign(plane * (guide_rows + 2 * light_rows), 0);
+    taps_.assign(static_cast<std::size_t>(denoising_.stride) * height, 0);
+    float *next = planes_.data();
+    const auto take = [&] { return std::exchange(next, next + plane); };
+    std::ranges::generate(denoising_.guides, take);
+    for (auto &light : denoising_.light)
+        std::ranges::generate(light, take);
+    denoising_.taps = taps_.data();
+}
+
+const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
+                                 std::span<const arhost::raytracer_common::PlacedObject> objects, bool deforms,
+                                 std::uint32_t sequence, std::uint32_t samples) {
+    if (static_cast<std::uint32_t>(denoising_.width) != intrinsics.width ||
+        static_cast<std::uint32_t>(denoising_.height) != intrinsics.height)
+        resize(intrinsics.width, intrinsics.height);
+    const std::size_t plane = static_cast<std::size_t>(denoising_.stride) * intrinsics.height;
+    auto *state = static_cast<std::byte *>(slots.after);
+    std::memset(state, 0, rows_offset(objects_));
+    StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, camera}, earlier{};
+    const auto *before = static_cast<const std::byte *>(slots.before);
+    if (before)
+        std::memcpy(&earlier, before, sizeof earlier);
+    if (earlier.version != state_version || earlier.width != header.width || earlier.height != header.height)
+        before = nullptr;
+    else
+        header.first = earlier.first, header.frames = earlier.frames + 1;
+    std::memcpy(state, &header, sizeof header);
+    auto *now = reinterpret_cast<ObjectState *>(state + sizeof header);
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        std::copy_n(objects[i].world_from_object, 12, now[i].world_from_object);
+        now[i].is_visible = objects[i].is_visible;
+    }
+    auto *after = reinterpret_cast<float *>(state + rows_offset(objects_));
+    for (int i = 0; i < history_rows; ++i)
+        denoising_.after[i] = after + static_cast<std::size_t>(i) * plane;
+    const auto used = static_cast<std::size_t>(reinterpret_cast<std::byte *>(after + history_rows * plane) - state);
+    std::memset(state + used, 0, state_size_ - used); // of a smaller image
+
+    std::ranges::fill(denoising_.before, nullptr);
+    denoising_.before_from_now = nullptr;
+    denoising_.camera_moved = false;
+    denoising_.pixel_angle = static_cast<float>(1 / intrinsics.fx);
+    denoising_.most_frames = 32;
+    // The numbers of frames may have gaps, such as three of four.
+    constexpr std::array<std::int32_t, 4> phases{0, 3, 1, 2};
+    denoising_.catcher_phase = phases[(header.first + header.frames) % 4];
+    denoising_.first_random_of_catchers = (header.first + header.frames / 4) * samples;
+    const ObjectState *then = nullptr;
+    if (before) {
+        denoising_.camera_before = earlier.camera;
+        denoising_.camera_moved = !std::ranges::equal(earlier.camera.eye, camera.eye) ||
+                                  !std::ranges::equal(earlier.camera.world_from_camera, camera.world_from_camera);
+        const auto *rows = reinterpret_cast<const float *>(before + rows_offset(objects_));
+        for (int i = 0; i < history_rows; ++i)
+            denoising_.before[i] = rows + static_cast<std::size_t>(i) * plane;
+        then = reinterpret_cast<const ObjectState *>(before + sizeof header);
+        if (std::memcmp(then, now, sizeof(ObjectState) * objects_) == 0)
+            then = nullptr;
+    }
+    if (then) {
+        for (std::size_t i = 0; i < objects_; ++i)
+            write_motion(now[i].world_from_object, then[i].world_from_object, motion_.data() + 12 * i);
+        denoising_.before_from_now = motion_.data();
+    }
+    if (then || deforms) { // shadows and reflections move over objects that do not
+        denoising_.most_frames = 6;
+        denoising_.catcher_phase = -1;
+    }
+    return denoising_;
+}
+
+void Denoiser::clear(const Tile &tile) {
+    for (std::int32_t y = tile.pixels.y0; y < tile.pixels.y1; ++y) {
+        float *row =
+            denoising_.guides[surface_guide] + std::ptrdiff_t{y} * denoising_.guide_stride() + Denoising::margin;
+        std::fill(row + tile.pixels.x0, row + tile.pixels.x1, 0.0f);
+    }
+}
+
+Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles,
+                        ThreadPool &threads) const {
+    constexpr std::int32_t chunk = 8; // rows
+    const std::int32_t height = denoising_.height;
+    const auto for_each_row = [&](auto step) {
+        threads.for_each(static_cast<std::size_t>((height + chunk - 1) / chunk), [&](std::size_t i, std::size_t) {
+            const auto first = static_cast<std::int32_t>(i) * chunk;
+            for (std::int32_t row = first; row < std::min(first + chunk, height); ++row)
+                step(row);
+        });
+    };
+    threads.for_each(tiles.size(), [&](std::size_t i, std::size_t) {
+        if (frame.goes_on(frame.progress))
+            kernel.find_taps(frame, tiles[i]);
+    });
+    for_each_row([&](std::int32_t row) { kernel.accumulate_row(frame, row, 0); });
+    for (int pass = 0; pass < passes; ++pass)
+        for_each_row([&](std::int32_t row) { kernel.filter_row(frame, row, pass); });
+    Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
+    std::mutex mutex;
+    for_each_row([&](std::int32_t row) {
+        const Rectangle part = kernel.resolve_row(frame, row, passes);
+        if (part.x0 >= part.x1)
+            return;
+        const std::lock_guard lock(mutex);
+        drawn = {std::min(drawn.x0, part.x0), std::min(drawn.y0, part.y0), std::max(drawn.x1, part.x1),
+                 std::max(drawn.y1, part.y1)};
+    });
+    return drawn;
+}
+
+} // namespace rt_embree

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Owns the memory of the denoiser (kernel/denoise.inl), and runs its steps. What it knows of earlier frames is in the
+// state that the host keeps (arhost_render_request.state_before), so that an image does not depend on the life of the
+// worker.
+#pragma once
+
+#include "kernel.hpp"
+#include "raytracer_common/light_sources.hpp"
+#include "thread_pool.hpp"
+
+#include <arhost/raytracer.h>
+
+#include <span>
+#include <vector>
+
+namespace rt_embree {
+
+// As in arhost_render_request.
+struct StateSlots {
+    const void *before = nullptr;
+    void *after = nullptr;
+};
+
+class Denoiser {
+public:
+    static constexpr int passes = 5; // of the filter
+
+    // `width`, `height`: the largest size of an image.
+    Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects);
+
+    std::uint64_t state_size() const { return state_size_; } // bytes
+
+    // Prepares a frame. `state.after` must not be NULL. `deforms`: whether meshes have changed; `sequence`: number of
+    // the frame; `samples`: per pixel.
+    // Returns the input of the kernel, which is valid until the next call.
+    const Denoising &begin(const StateSlots &state, const arhost_intrinsics &intrinsics, const Camera &camera,
+                           std::span<const arhost::raytracer_common::PlacedObject> objects, bool deforms,
+                           std::uint32_t sequence, std::uint32_t samples);
+    // Makes a tile empty.
+    void clear(const Tile &tile);
+    // Runs the steps after all tiles have been rendered or cleared. Returns a rectangle of the pixels that virtual
+    // objects affect.
+    Rectangle run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles, ThreadPool &threads) const;
+
+private:
+    void resize(std::uint32_t width, std::uint32_t height);
+
+    std::size_t objects_;
+    std::uint64_t state_size_;
+    std::vector<float> planes_;
+    std::vector<unsigned> taps_;
+    std::vector<float> motion_; // Denoising::before_from_now
+    Denoising denoising_{};
+};
+
+} // namespace rt_embree

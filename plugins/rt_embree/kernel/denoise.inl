@@ -1,0 +1,514 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The denoiser: means over frames along the motion of surfaces, then a filter that is wider where the means are less
+// certain (C. Schied et al., Spatiotemporal Variance-Guided Filtering, HPG 2017). It denoises the light of the
+// surface at the centre of each pixel: of virtual objects, their radiance divided by their albedo; of catchers, the
+// change of their light. At edges, more rays find which surfaces a pixel shows, and the pixel gets the light of the
+// neighbours that show them.
+#pragma once
+#include "path.inl"
+
+ARHOST_INLINE Vec3 load3(const float *const *rows, std::ptrdiff_t at) {
+    return {load(rows[0] + at), load(rows[1] + at), load(rows[2] + at)};
+}
+ARHOST_INLINE void store3(float *const *rows, std::ptrdiff_t at, Vec3 a) {
+    store(rows[0] + at, a.x);
+    store(rows[1] + at, a.y);
+    store(rows[2] + at, a.z);
+}
+ARHOST_INLINE Vec3 gather3(const float *const *rows, Int at) {
+    return {gather(rows[0], at), gather(rows[1], at), gather(rows[2], at)};
+}
+ARHOST_INLINE const float *const *rows_of(float *const *rows) {
+    return const_cast<const float *const *>(rows);
+}
+
+// Index of a pixel in guides and light, and in histories.
+ARHOST_INLINE std::ptrdiff_t guide_at(const Denoising &denoising, int x, int y) {
+    return std::ptrdiff_t{y} * denoising.guide_stride() + Denoising::margin + x;
+}
+ARHOST_INLINE std::ptrdiff_t history_at(const Denoising &denoising, int x, int y) {
+    return std::ptrdiff_t{y} * denoising.stride + x;
+}
+ARHOST_INLINE Int surfaces_at(const Denoising &denoising, std::ptrdiff_t at) {
+    return bits_of(load(denoising.guides[surface_guide] + at));
+}
+
+// Normals with 10 bits per component.
+ARHOST_INLINE Int packed_normal(Vec3 n) {
+    const auto bits = [](Float a) __attribute__((always_inline)) {
+        return to_int(a * Float(511.0f) + Float(512.0f));
+    };
+    return bits(n.x) | (bits(n.y) << Int(10)) | (bits(n.z) << Int(20));
+}
+ARHOST_INLINE Vec3 unpacked_normal(Int a) {
+    const auto value = [](Int bits) __attribute__((always_inline)) {
+        return (to_float(bits & Int(1023)) - Float(511.5f)) * Float(1.0f / 511);
+    };
+    return {value(a), value(a >> Int(10)), value(a >> Int(20))};
+}
+
+// Values of variance_light of light[0]: whether the light of a pixel was sampled in this frame. A pixel of a catcher
+// that was not has the light of the pixel of its 2×2 that was, if both show the same surface, else 0.
+constexpr float not_sampled = 0, borrowed = 0.5f, sampled = 1;
+
+// Writes the guides and the light of a block. `count`: the number of samples.
+ARHOST_INLINE void write_for_denoiser(const Frame &frame, const Scratch &scratch, int first_pixel,
+                                      std::uint32_t count, int x, int y, int width, int height) {
+    const Denoising &denoising = *frame.denoising;
+    const Float scale(1.0f / static_cast<float>(count));
+    const auto guide = [&](int row) __attribute__((always_inline)) {
+        return load(scratch.guide[row] + first_pixel);
+    };
+    const auto write = [&](float *plane, const float *values) __attribute__((always_inline)) {
+        for (int row = 0; row < height; ++row)
+            __builtin_memcpy(plane + guide_at(denoising, x, y + row), values + block * row, 4 * width);
+    };
+    alignas(64) float values[lanes], lender[lanes];
+    const Int surface = bits_of(guide(surface_guide));
+    Float source(sampled);
+    Int lane = lane_numbers();
+    if (const int phase = denoising.catcher_phase; phase >= 0) {
+        const Bool is_catcher = is_kind(surface, real_surface);
+        const Int chosen = (lane_numbers() & Int(~5)) | Int((phase & 1) | (phase & 2) << 1);
+        store(lender, float_of(surface));
+        const Bool lends = bits_of(pick(lender, chosen)) == surface;
+        source = select(is_catcher & (chosen != lane), select(lends, Float(borrowed), Float(not_sampled)), source);
+        lane = select(is_catcher & lends, chosen, lane);
+    }
+    const Bool is_virtual = load(scratch.sum[coverage_row] + first_pixel) > Float(0.0f);
+    for (int i = 0; i < 3; ++i) {
+        const Float radiance = load(scratch.sum[light_row + i] + first_pixel) / guide(albedo_guide + i);
+        Float change(0.0f);
+        if (frame.scene.has_catchers) {
+            store(lender, load(scratch.sum[change_row + i] + first_pixel));
+            change = pick(lender, lane);
+        }
+        store(values, select(is_virtual, radiance, change) * scale);
+        write(denoising.light[0][i], values);
+    }
+    store(values, source);
+    write(denoising.light[0][variance_light], values);
+    for (int i = 0; i < guide_rows; ++i)
+        write(denoising.guides[i], scratch.guide[i] + first_pixel);
+}
+
+// The pixel of the previous frame that shows a point.
+struct Reprojected {
+    Float x, y;     // px
+    Float distance; // mm, from the camera
+    Bool inside;
+};
+ARHOST_INLINE Reprojected reprojected(const Frame &frame, Vec3 position) {
+    const Denoising &denoising = *frame.denoising;
+    const Vec3 to_point = position - splat(denoising.camera_before.eye);
+    const PixelOf pixel = pixel_towards(frame.path.video, denoising.camera_before, to_point);
+    // From texels of the video to pixels of the image.
+    const Texture &video = frame.path.video.image;
+    const float across = static_cast<float>(denoising.width) / static_cast<float>(video.width),
+                down = static_cast<float>(denoising.height) / static_cast<float>(video.height);
+    return {pixel.x * Float(across) - Float(0.5f), pixel.y * Float(down) - Float(0.5f), length(to_point),
+            pixel.in_front};
+}
+
+// The means of earlier frames at surfaces.
+struct Past {
+    Vec3 light;
+    Float moments[2], frames; // frames: 0 if the surface is new
+};
+ARHOST_INLINE Past past_of(const Frame &frame, Vec3 position, Vec3 normal, Int surface, Bool active) {
+    const Denoising &denoising = *frame.denoising;
+    Past past{black(), {Float(0.0f), Float(0.0f)}, Float(0.0f)};
+    if (!denoising.before[0])
+        return past;
+    if (denoising.before_from_now) {
+        const Int first = object_of_surface(surface) * Int(12);
+        const auto column = [&](int i) __attribute__((always_inline)) {
+            const float *table = denoising.before_from_now + 3 * i;
+            const Int at = select(active, first, Int(0));
+            return Vec3{gather(table, at), gather(table + 1, at), gather(table + 2, at)};
+        };
+        const Vec3 columns[] = {column(0), column(1), column(2), column(3)};
+        position = columns[0] * position.x + columns[1] * position.y + columns[2] * position.z + columns[3];
+        normal = columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z;
+    }
+    const Reprojected at = reprojected(frame, position);
+    const Float left = floor(max(min(at.x + Float(1.0f / 64), Float(1e6f)), Float(-2.0f))),
+                top = floor(max(min(at.y + Float(1.0f / 64), Float(1e6f)), Float(-2.0f)));
+    const Float along = max(at.x - left, Float(0.0f)), down = max(at.y - top, Float(0.0f));
+    Float total(0.0f);
+    for (int i = 0; i < 4; ++i) {
+        const Int x = to_int(left) + Int(i & 1), y = to_int(top) + Int(i >> 1);
+        const Float weight = (i & 1 ? along : Float(1.0f) - along) * (i >> 1 ? down : Float(1.0f) - down);
+        Bool here = active & at.inside & (Int(-1) < x) & (x < Int(denoising.width)) & (Int(-1) < y) &
+                    (y < Int(denoising.height)) & (weight > Float(0.01f));
+        const Int pixel = select(here, y * Int(denoising.stride) + x, Int(0));
+        here = here & (bits_of(gather(denoising.before[surface_history], pixel)) == surface) &
+               (abs(gather(denoising.before[distance_history], pixel) - at.distance) < at.distance * Float(0.03f)) &
+               (dot(unpacked_normal(bits_of(gather(denoising.before[normal_history], pixel))), normal) > Float(0.8f));
+        if (!any(here))
+            continue;
+        const Float share = select(here, weight, Float(0.0f));
+        const auto add = [&](Float & sum, int row) __attribute__((always_inline)) {
+            sum = sum + select(here, gather(denoising.before[row], pixel), Float(0.0f)) * share;
+        };
+        add(past.light.x, 0);
+        add(past.light.y, 1);
+        add(past.light.z, 2);
+        add(past.moments[0], moment_history);
+        add(past.moments[1], moment_history + 1);
+        add(past.frames, frames_history);
+        total = total + share;
+    }
+    const Float scale = select(total > Float(0.0f), Float(1.0f) / max(total, Float(1e-6f)), Float(0.0f));
+    past.light = past.light * scale;
+    for (Float &moment : past.moments)
+        moment = moment * scale;
+    past.frames = past.frames * scale;
+    return past;
+}
+
+// Returns the largest luminance that a pixel may have: somewhat more than that of its neighbours, which are `apart`
+// pixels away. Infinite if there are too few of them.
+ARHOST_INLINE Float limit_by_neighbours(const Denoising &denoising, std::ptrdiff_t at, int row, Int surface,
+                                        int apart) {
+    Float brightest(0.0f), count(0.0f);
+    for (int dy = -apart; dy <= apart; dy += apart)
+        for (int dx = -apart; dx <= apart; dx += apart) {
+            if ((dx == 0 && dy == 0) || row + dy < 0 || row + dy >= denoising.height)
+                continue;
+            const std::ptrdiff_t there = at + dy * denoising.guide_stride() + dx;
+            const Bool same = surfaces_at(denoising, there) == surface;
+            brightest =
+                max(brightest, select(same, luminance(load3(rows_of(denoising.light[0]), there)), Float(0.0f)));
+            count = count + select(same, Float(1.0f), Float(0.0f));
+        }
+    return select(count < Float(3.0f), Float(far_away), brightest * Float(1.5f) + Float(0.02f));
+}
+
+// Returns the light of a row's pixels without fireflies: single paths that find a small bright light would remain
+// visible for many frames.
+ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, std::ptrdiff_t at, int row, Int surface) {
+    Float limit = limit_by_neighbours(denoising, at, row, surface, 1);
+    const Bool borrows = is_kind(surface, real_surface);
+    if (denoising.catcher_phase >= 0 && any(borrows)) // nearer pixels may have the same light
+        limit = select(borrows, limit_by_neighbours(denoising, at, row, surface, 2), limit);
+    const Vec3 light = load3(rows_of(denoising.light[0]), at);
+    const Float value = luminance(light);
+    return light * select(value > limit, limit / max(value, Float(1e-6f)), Float(1.0f));
+}
+
+// Values of variance_light: too few frames tell the variance; the light of a surface is not known.
+constexpr float unknown = -1, no_light = -2;
+
+// Accumulates a row: means over frames. The filter reads them from light[1]; the variance is that of the mean.
+ARHOST_INLINE void accumulate(const Frame &frame, std::int32_t row) {
+    const Denoising &denoising = *frame.denoising;
+    for (std::int32_t x = 0; x < denoising.width; x += lanes) {
+        const std::ptrdiff_t at = guide_at(denoising, x, row), kept = history_at(denoising, x, row);
+        const Int surface = surfaces_at(denoising, at);
+        const Bool active = surface != Int(0);
+        if (!any(active)) {
+            for (float *to : denoising.after)
+                store(to + kept, Float(0.0f));
+            for (float *to : denoising.light[1])
+                store(to + at, Float(0.0f));
+            continue;
+        }
+        const float *const *guides = rows_of(denoising.guides);
+        const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
+        const Vec3 light = light_without_fireflies(denoising, at, row, surface);
+        const Past past = past_of(frame, position, normal, surface, active);
+        const Float source = load(denoising.light[0][variance_light] + at);
+        // Light of another pixel is only used where nothing better is known.
+        const Bool is_new = (source == Float(sampled)) | ((source == Float(borrowed)) & (past.frames < Float(1.0f)));
+        Float most(denoising.most_frames);
+        // The surroundings have no noise in mirrors and glass.
+        const Bool shows_surroundings = is_kind(surface, specular_surface) & (surface < Int(mirrored_unit));
+        if (denoising.camera_moved) {
+            // Highlights move over the surface, and curved mirrors and glass show a surface elsewhere than
+            // store_seen() assumes.
+            most = select(is_kind(surface, glossy_surface), min(most, Float(8.0f)), most);
+            most = select(is_kind(surface, specular_surface), min(most, Float(4.0f)), most);
+            most = select(shows_surroundings, Float(1.0f), most);
+        }
+        const Float more = select(is_new, Float(1.0f), Float(0.0f));
+        const Float frames = select(active, min(past.frames + more, most), Float(0.0f));
+        const Float share = more / max(frames, Float(1.0f));
+        const Vec3 mean = past.light + (light - past.light) * share;
+        const Float value = min(luminance(light), Float(65504.0f));
+        const Float first = past.moments[0] + (value - past.moments[0]) * share,
+                    second = past.moments[1] + (value * value - past.moments[1]) * share;
+        Float variance = max(second - first * first, Float(0.0f)) / max(frames, Float(1.0f));
+        variance = select(frames < Float(8.0f), select(shows_surroundings, Float(0.0f), Float(unknown)), variance);
+        variance = select(frames > Float(0.0f), variance, Float(no_light));
+        store3(denoising.after, kept, select(active, mean, black()));
+        store(denoising.after[moment_history] + kept, select(active, first, Float(0.0f)));
+        store(denoising.after[moment_history + 1] + kept, select(active, second, Float(0.0f)));
+        store(denoising.after[distance_history] + kept,
+              select(active, length(position - splat(frame.camera.eye)), Float(0.0f)));
+        store(denoising.after[normal_history] + kept, float_of(select(active, packed_normal(normal), Int(0))));
+        store(denoising.after[surface_history] + kept, float_of(surface));
+        store(denoising.after[frames_history] + kept, frames);
+        store3(denoising.light[1], at, select(active, mean, black()));
+        store(denoising.light[1][variance_light] + at, select(active, variance, Float(0.0f)));
+    }
+}
+
+// Returns the variance of the light near pixels whose history is too short to tell it, from their neighbours.
+ARHOST_INLINE Float variance_of_neighbours(const Denoising &denoising, const float *const *light, std::ptrdiff_t at,
+                                           int row, Int surface) {
+    Float count(0.0f), first(0.0f), second(0.0f);
+    for (int dy = -2; dy <= 2; ++dy) {
+        if (row + dy < 0 || row + dy >= denoising.height)
+            continue;
+        for (int dx = -2; dx <= 2; ++dx) {
+            const std::ptrdiff_t there = at + dy * denoising.guide_stride() + dx;
+            const Bool same =
+                (surfaces_at(denoising, there) == surface) & (load(light[variance_light] + there) > Float(no_light));
+            const Float value = luminance(load3(light, there));
+            count = count + select(same, Float(1.0f), Float(0.0f));
+            first = first + select(same, value, Float(0.0f));
+            second = second + select(same, value * value, Float(0.0f));
+        }
+    }
+    const Float scale = Float(1.0f) / max(count, Float(1.0f)), mean = first * scale;
+    // Of a few pixels, the variance is uncertain, and mostly too small.
+    return max(second * scale - mean * mean, Float(0.0f)) * (Float(1.0f) + Float(8.0f) * scale);
+}
+
+// Differences of the luminance below about half a code are filtered, however certain.
+constexpr float least_variance = 1e-6f;
+
+// Filters a row: a pass of the à-trous filter with 3×3 taps, 2^pass pixels apart.
+ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
+    const Denoising &denoising = *frame.denoising;
+    const int step = 1 << pass;
+    const float *const *from = rows_of(denoising.light[(pass + 1) & 1]);
+    float *const *to = denoising.light[pass & 1];
+    const float *const *guides = rows_of(denoising.guides);
+    const std::ptrdiff_t down = denoising.guide_stride();
+    for (std::int32_t x = 0; x < denoising.width; x += lanes) {
+        const std::ptrdiff_t at = guide_at(denoising, x, row);
+        const Int surface = surfaces_at(denoising, at);
+        if (!any(surface != Int(0))) {
+            for (int i = 0; i < light_rows; ++i)
+                store(to[i] + at, Float(0.0f));
+            continue;
+        }
+        const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
+        const Vec3 light = load3(from, at);
+        const Float own = luminance(light);
+        Float variance = load(from[variance_light] + at);
+        if (pass == 0)
+            if (const Bool needed = variance == Float(unknown); any(needed))
+                variance = select(needed, variance_of_neighbours(denoising, from, at, row, surface), variance);
+        const Bool has_light = variance > Float(no_light);
+        // Surfaces are flat within the width of a tap, up to about twice the size of a pixel.
+        // In curved mirrors they are not.
+        const Float distance = length(position - splat(frame.camera.eye)) *
+                               select(is_kind(surface, specular_surface), Float(8.0f), Float(1.0f));
+        const Float inverse_tolerance =
+            Float(1.0f) / (distance * Float(2.0f * static_cast<float>(step) * denoising.pixel_angle) + Float(1e-6f));
+        const Float own_weight = select(has_light, Float(0.25f), Float(0.0f)), least = max(variance, Float(0.0f));
+        Vec3 sum = light * own_weight;
+        Float total = own_weight, squares = least * own_weight * own_weight;
+        for (int dy = -1; dy <= 1; ++dy) {
+            if (row + dy * step < 0 || row + dy * step >= denoising.height)
+                continue;
+            for (int dx = -1; dx <= 1; ++dx) {
+                if (dx == 0 && dy == 0)
+                    continue;
+                const std::ptrdiff_t there = at + dy * step * down + dx * step;
+                const Float of_other = load(from[variance_light] + there);
+                const Bool same = (surfaces_at(denoising, there) == surface) & (of_other > Float(no_light));
+                if (!any(same))
+                    continue;
+                const Vec3 other = load3(from, there);
+                const Float facing = max(dot(load3(guides + normal_guide, there), normal), Float(0.0f));
+                const Float apart = abs(dot(load3(guides + position_guide, there) - position, normal));
+                const Float difference = luminance(other) - own;
+                const Float spread = least + max(of_other, least) + Float(least_variance);
+                const auto falling = [](Float a) __attribute__((always_inline)) {
+                    const Float rest = max(Float(1.0f) - a, Float(0.0f));
+                    return rest * rest;
+                };
+                Float alike = facing * facing;
+                alike = alike * alike;
+                alike = alike * alike;
+                alike = alike * alike; // cos^16
+                const Float kernel((dx == 0 ? 2.0f : 1.0f) * (dy == 0 ? 2.0f : 1.0f) / 16);
+                const Float plausible =
+                    select(has_light, falling(difference * difference / (spread * Float(9.0f))), Float(1.0f));
+                const Float weight =
+                    select(same, kernel * alike * falling(apart * inverse_tolerance) * plausible, Float(0.0f));
+                sum = sum + other * weight;
+                squares = squares + weight * weight * max(of_other, least);
+                total = total + weight;
+            }
+        }
+        const Bool is_known = total > Float(0.0f);
+        const Float scale = Float(1.0f) / max(total, Float(1e-30f));
+        store3(to, at, select(is_known, sum * scale, black()));
+        store(to[variance_light] + at, select(is_known, squares * scale * scale, Float(no_light)));
+    }
+}
+
+// A pixel at an edge has eight rays. Four bits for each tell which light it gets: that of one of the nine pixels
+// around (3 · (dy + 1) + dx + 1), or none.
+constexpr int tap_count = 8, own_tap = 4, no_tap = 15;
+constexpr unsigned only_own = 0x44444444;
+
+// Returns the pixels of a row that differ from a neighbour.
+ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
+    const Denoising &denoising = *frame.denoising;
+    const float *const *guides = rows_of(denoising.guides);
+    const std::ptrdiff_t at = guide_at(denoising, x, y), down = denoising.guide_stride();
+    const Int surface = surfaces_at(denoising, at);
+    const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
+    const Float tolerance = length(position - splat(frame.camera.eye)) * Float(3 * denoising.pixel_angle);
+    Bool edge = bool_of(false);
+    for (int i = 0; i < 4; ++i) {
+        const int dx = i == 0 ? -1 : i == 1 ? 1 : 0, dy = i == 2 ? -1 : i == 3 ? 1 : 0;
+        if (y + dy < 0 || y + dy >= denoising.height)
+            continue;
+        const std::ptrdiff_t there = at + dy * down + dx;
+        const Int other = surfaces_at(denoising, there);
+        const Bool inside = Int(-1) < (lane_numbers() + Int(x + dx));
+        const Bool right = (lane_numbers() + Int(x + dx)) < Int(denoising.width);
+        const Bool folded = (other != Int(0)) & ~is_kind(surface, specular_surface) &
+                            ((dot(load3(guides + normal_guide, there), normal) < Float(0.8f)) |
+                             (abs(dot(load3(guides + position_guide, there) - position, normal)) > tolerance));
+        edge = edge | (inside & right & ((((other ^ surface) & Int(mirrored_unit - 1)) != Int(0)) | folded));
+    }
+    return edge & ((lane_numbers() + Int(x)) < Int(denoising.width));
+}
+
+// Finds the taps of the pixels of a tile.
+ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
+    const Denoising &denoising = *frame.denoising;
+    const Rectangle &all = tile.pixels;
+    bool has_edges = false;
+    for (int y = all.y0; y < all.y1; ++y)
+        for (int x = all.x0; x < all.x1; x += lanes) {
+            const Bool edges = edges_at(frame, x, y);
+            store(denoising.taps + history_at(denoising, x, y), select(edges, Int(0), Int(only_own)));
+            has_edges = has_edges || any(edges);
+        }
+    if (!has_edges)
+        return;
+    const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
+    for_each_block(all, [&](int number, int x0, int y0, int width, int height) {
+        unsigned edge_lanes = 0;
+        for (int row = 0; row < height; ++row)
+            for (int column = 0; column < width; ++column)
+                edge_lanes |= unsigned{denoising.taps[history_at(denoising, x0 + column, y0 + row)] == 0}
+                              << (block * row + column);
+        if (edge_lanes == 0)
+            return;
+        const Bool edges = ((Int(static_cast<int>(edge_lanes)) >> lane_numbers()) & Int(1)) == Int(1);
+        const Int x = Int(x0) + (lane_numbers() & Int(block - 1)), y = Int(y0) + (lane_numbers() >> Int(2));
+        const float *const *guides = rows_of(denoising.guides);
+        Int taps(0);
+        for (int i = 0; i < tap_count; ++i) {
+            // A lattice with a different row and column for each ray.
+            constexpr int columns[tap_count] = {3, 6, 1, 4, 7, 2, 5, 0};
+            const float dx = (static_cast<float>(columns[i]) + 0.5f) / tap_count - 0.5f,
+                        dy = (static_cast<float>(i) + 0.5f) / tap_count - 0.5f;
+            const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), dx, dy);
+            const PrimaryHits hits =
+                trace_primary(frame.scene, splat(frame.camera.eye), direction, edges & (direction.x == direction.x));
+            Int surface(0);
+            Float far(0.0f);
+            if (any(hits.is_virtual)) {
+                surface = select(hits.is_virtual, surface_of(frame.scene, hits.rays.hit, hits.is_virtual), surface);
+                far = select(hits.is_virtual, load(hits.rays.ray.tfar), far);
+            }
+            if (any(hits.caught)) {
+                surface = select(hits.caught, surface_of(frame.scene, hits.catcher_rays.hit, hits.caught), surface);
+                far = select(hits.caught, load(hits.catcher_rays.ray.tfar), far);
+            }
+            const Vec3 position = splat(frame.camera.eye) + direction * far;
+            Int chosen = select(surface == Int(0), Int(no_tap), Int(own_tap));
+            Float least(1e30f);
+            for (int tap = 0; tap < 9; ++tap) {
+                const Int tap_x = x + Int(tap % 3 - 1), tap_y = y + Int(tap / 3 - 1);
+                const Bool inside = edges & (Int(-1) < tap_y) & (tap_y < Int(denoising.height));
+                const Int at = select(inside, tap_y * Int(denoising.guide_stride()) + tap_x + Int(Denoising::margin),
+                                      Int(Denoising::margin));
+                const Int there = bits_of(gather(guides[surface_guide], at)) & Int(mirrored_unit - 1);
+                const Bool same = inside & (there == surface) & (surface != Int(0));
+                if (!any(same))
+                    continue;
+                const Vec3 away = gather3(guides + position_guide, at) - position;
+                const Float from_plane = abs(dot(gather3(guides + normal_guide, at), away));
+                const Float apart = select(is_kind(surface, specular_surface), Float(0.0f), from_plane) +
+                                    Float(tap == own_tap ? 0.0f : 1e-3f) * far;
+                const Bool nearer = same & (apart < least);
+                least = select(nearer, apart, least);
+                chosen = select(nearer, Int(tap), chosen);
+            }
+            taps = taps | (chosen << Int(4 * i));
+        }
+        alignas(64) int values[lanes];
+        store(values, taps);
+        for (unsigned remaining = edge_lanes; remaining; remaining &= remaining - 1) {
+            const int lane = __builtin_ctz(remaining);
+            denoising.taps[history_at(denoising, x0 + lane % block, y0 + lane / block)] =
+                static_cast<unsigned>(values[lane]);
+        }
+    });
+}
+
+// Writes a row of the image. `passes`: of the filter.
+ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row, int passes) {
+    const Denoising &denoising = *frame.denoising;
+    const float *const *from = rows_of(denoising.light[(passes + 1) & 1]);
+    const float *const *guides = rows_of(denoising.guides);
+    Rectangle drawn{denoising.width, row, 0, row + 1};
+    for (std::int32_t x = 0; x < denoising.width; x += lanes) {
+        const int width = denoising.width - x < lanes ? denoising.width - x : lanes;
+        const Int taps = load(denoising.taps + history_at(denoising, x, row));
+        LinearBlock linear{black(), black()};
+        const auto add = [&](Int surface, Vec3 light, Vec3 albedo, Float share, Bool here)
+            __attribute__((always_inline)) {
+            const Bool is_virtual = here & (surface != Int(0)) & ~is_kind(surface, real_surface);
+            linear.added = linear.added + select(is_virtual, light * albedo * share, black());
+            linear.transmittance =
+                linear.transmittance +
+                select(here & ~is_virtual, (white() + select(surface != Int(0), light, black())) * share, black());
+        };
+        const std::ptrdiff_t at = guide_at(denoising, x, row);
+        const Bool plain = taps == Int(static_cast<int>(only_own));
+        add(surfaces_at(denoising, at), load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
+        const Bool edges = ~plain & (lane_numbers() < Int(width));
+        if (any(edges)) {
+            for (int i = 0; i < tap_count; ++i) {
+                const Int tap = (taps >> Int(4 * i)) & Int(15);
+                const Int dy = to_int(to_float(tap) * Float(1 / 3.0f) + Float(0.01f)) - Int(1),
+                          dx = tap - (dy + Int(1)) * Int(3) - Int(1);
+                const Bool here = edges & (tap != Int(no_tap));
+                const Int there =
+                    select(here, Int(static_cast<int>(at)) + lane_numbers() + dy * Int(denoising.guide_stride()) + dx,
+                           Int(Denoising::margin));
+                const Int surface = select(here, bits_of(gather(guides[surface_guide], there)), Int(0));
+                add(surface, gather3(from, there), gather3(guides + albedo_guide, there), Float(1.0f / tap_count),
+                    edges);
+            }
+        }
+        linear = {bounded_for_halves(linear.added), bounded_for_halves(linear.transmittance)};
+        bool affected = false;
+        if (frame.linear) {
+            affected = write_linear(frame, x, row, width, 1, linear, lanes);
+        } else {
+            const Int pixels = straight_of(frame, linear);
+            __builtin_memcpy(frame.rgba + std::size_t{frame.stride} * row + std::size_t{4} * x, &pixels, 4 * width);
+            affected = any(((pixels >> Int(24)) != Int(0)) & (lane_numbers() < Int(width)));
+        }
+        if (affected) {
+            drawn.x0 = x < drawn.x0 ? x : drawn.x0;
+            drawn.x1 = x + width > drawn.x1 ? x + width : drawn.x1;
+        }
+    }
+    return drawn;
+}

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The surfaces that pixels show, for the denoiser.
+#pragma once
+#include "path_catcher.inl"
+
+// Kinds of surfaces.
+enum SurfaceKind : int {
+    scattering_surface,
+    specular_surface, // mirrors and glass
+    real_surface,
+    glossy_surface
+};
+
+// Returns the numbers of the surfaces hit: 4 · (index of the object + 1) + kind. Where a specular surface shows
+// another one, store_seen() adds mirrored_unit · (index of the latter + 1).
+constexpr int mirrored_unit = 1 << 20;
+ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool active) {
+    Int kinds(0);
+    for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
+        const arhost_material_model model = object.material->model;
+        SurfaceKind kind = scattering_surface;
+        if (object.role != ARHOST_ROLE_VIRTUAL)
+            kind = real_surface;
+        else if (model == ARHOST_MATERIAL_METAL || model == ARHOST_MATERIAL_METALLIC_ROUGHNESS)
+            kind = glossy_surface;
+        else if (model == ARHOST_MATERIAL_MIRROR || model == ARHOST_MATERIAL_GLASS)
+            kind = specular_surface;
+        kinds = select(here, Int(kind), kinds);
+    });
+    return (((object_number(scene, hit) + Int(1)) << Int(2)) & Int(mirrored_unit - 1)) | kinds;
+}
+ARHOST_INLINE Int object_of_surface(Int surface) {
+    return ((surface & Int(mirrored_unit - 1)) >> Int(2)) - Int(1);
+}
+ARHOST_INLINE Bool is_kind(Int surface, SurfaceKind kind) {
+    return (surface & Int(3)) == Int(kind);
+}
+
+struct Guides {
+    Vec3 position, normal, albedo;
+    Int surface;
+};
+ARHOST_INLINE void put_guides(const Work &work, int first_pixel, const Guides &guides, Bool active) {
+    const Float values[] = {guides.position.x, guides.position.y,       guides.position.z, guides.normal.x,
+                            guides.normal.y,   guides.normal.z,         guides.albedo.x,   guides.albedo.y,
+                            guides.albedo.z,   float_of(guides.surface)};
+    for (int row = 0; row < guide_rows; ++row) {
+        float *to = work.scratch.guide[row] + first_pixel;
+        store(to, select(active, values[row], load(to)));
+    }
+}
+
+// The denoiser divides the light of a surface by its albedo, so that textures stay sharp.
+ARHOST_INLINE Vec3 divisor_of(const Surface &s) {
+    const Vec3 gloss = select(s.is_rough, s.specular, black());
+    const Bool divides = s.is_lit & ~(largest(s.emission) > Float(0.0f));
+    const auto of = [&](Float a, Float b) __attribute__((always_inline)) {
+        return select(divides, max(a + b, Float(1.0f / 64)), Float(1.0f));
+    };
+    return {of(s.diffuse.x, gloss.x), of(s.diffuse.y, gloss.y), of(s.diffuse.z, gloss.z)};
+}
+
+// Follows rays through mirrors and glass, always the way of most light, to what the pixels show there. Replaces the
+// guides of these pixels: normal and albedo, as they are seen, and the point where the surface seems to be.
+ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction, int first_pixel, Bool specular) {
+    const Frame &frame = work.frame;
+    const Scene &scene = frame.scene;
+    Vec3 throughput = white();
+    Float travelled(0.0f);
+    Vec3 towards = direction;
+    constexpr int most_bounces = 8;
+    for (int bounce = 0; bounce < most_bounces && any(specular); ++bounce) {
+        const Surface s = surface_at(scene, rays, specular);
+        travelled = travelled + s.distance;
+        Bool arrived = specular;
+        Vec3 origin = s.position, next = towards;
+        for_each_object(scene, rays.hit, specular, [&](const Object &object, Bool here) {
+            const arhost_material &material = *object.material;
+            const Vec3 above = s.position + s.geometric_normal * s.offset;
+            if (material.model == ARHOST_MATERIAL_MIRROR) {
+                throughput = select(here, throughput * splat(material.reflectivity), throughput);
+                origin = select(here, above, origin);
+                next = select(here, reflected(s, towards), next);
+                arrived = arrived & ~here;
+            } else if (material.model == ARHOST_MATERIAL_GLASS) {
+                const GlassScatter glass = scatter_at_glass(s, towards, material, {Float(0.0f), Float(0.0f)}, here);
+                const Bool reflects = here & (glass.reflectance > Float(0.5f));
+                const Vec3 share = select(reflects, splat(material.reflectivity) * glass.reflectance,
+                                          splat(material.refraction) * (Float(1.0f) - glass.reflectance));
+                throughput = select(here, throughput * glass.transmittance * share, throughput);
+                origin = select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), origin);
+                next = select(here, select(reflects, glass.reflected, glass.refracted), next);
+                arrived = arrived & ~here;
+            }
+        });
+        if (any(arrived)) {
+            const Filmed filmed = filmed_surface(frame, s, arrived & s.is_real);
+            const Vec3 albedo = select(filmed.inside, filmed.light, divisor_of(s)) * throughput;
+            const auto least = [](Float a) __attribute__((always_inline)) {
+                return max(a, Float(1.0f / 64));
+            };
+            const Int mirror = bits_of(load(work.scratch.guide[surface_guide] + first_pixel));
+            const Int seen = object_number(scene, rays.hit) & Int(1023);
+            put_guides(work, first_pixel,
+                       {splat(frame.camera.eye) + direction * travelled,
+                        s.normal,
+                        {least(albedo.x), least(albedo.y), least(albedo.z)},
+                        mirror + (seen + Int(1)) * Int(mirrored_unit)},
+                       arrived);
+        }
+        specular = specular & ~arrived;
+        towards = normalize(next);
+        set_ray(rays.ray, origin, towards, Float(far_away), Int(all_masks));
+        specular = trace(scene, scene.root, make_query(Coherence::incoherent), rays, specular);
+    }
+}
+
+// Stores what the rays through the centres of a block's pixels meet.
+ARHOST_INLINE void store_guides(const Work &work, const PrimaryHits &hits, Vec3 direction, int first_pixel) {
+    const Scene &scene = work.frame.scene;
+    const auto put = [&](const RTCRayHit16 &rays, Bool active, bool is_real) __attribute__((always_inline)) {
+        const Surface s = surface_at(scene, rays, active);
+        const Vec3 albedo = is_real ? white() : divisor_of(s);
+        put_guides(work, first_pixel, {s.position, s.normal, albedo, surface_of(scene, rays.hit, active)}, active);
+    };
+    if (any(hits.caught))
+        put(hits.catcher_rays, hits.caught, true);
+    if (!any(hits.is_virtual))
+        return;
+    put(hits.rays, hits.is_virtual, false);
+    const Bool specular =
+        hits.is_virtual & is_kind(bits_of(load(work.scratch.guide[surface_guide] + first_pixel)), specular_surface);
+    if (any(specular))
+        store_seen(work, hits.rays, normalize(direction), first_pixel, specular);
+}

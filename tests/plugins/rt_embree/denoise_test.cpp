@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The option `denoise`: few samples with the light of earlier frames, compared with converged pictures.
+#include "linear_tracer.hpp"
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <set>
+
+namespace arhost::test {
+namespace {
+
+constexpr std::uint32_t width = 200, height = 150; // of pinhole()
+const Options noisy{{"samples", "1"}}, denoised{{"samples", "1"}, {"denoise", "true"}}, converged{{"samples", "256"}};
+
+// Objects of several materials on a table, in soft light.
+SceneBuilder still_life() {
+    scene::Settings settings;
+    settings.integrator = ARHOST_INTEGRATOR_PATH;
+    settings.ambient = glm::vec3(0);
+    settings.background = glm::vec3(0.4f);
+    SceneBuilder scene(settings);
+    scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
+    scene.add_ball("red", {-35, 0, 25, 25}, diffuse(0.7f, 0.2f, 0.1f));
+    scene.add_mesh("box", moved(cube(15), {30, 20, 15}), diffuse(0.7f, 0.7f, 0.7f));
+    scene.add_ball("gold", {25, -30, 15, 15}, metallic_roughness({0.9f, 0.7f, 0.3f}, 1, 0.4f));
+    scene.add_light(bulb({-150, -100, 250}, 60, 5e4f, ARHOST_FALLOFF_INVERSE_SQUARE));
+    return scene;
+}
+arhost_camera turned(double degrees) {
+    const double angle = degrees * std::numbers::pi / 180;
+    return camera({180 * std::sin(angle), -180 * std::cos(angle), 110}, {0, 0, 10}, {0, 0, 1});
+}
+
+SceneBuilder with_mirror_and_glass() {
+    SceneBuilder scene = still_life();
+    scene.add_ball("mirror", {-10, 60, 25, 25}, mirror(0.9f));
+    scene.add_ball("glass", {-45, -50, 14, 14}, glass_of());
+    return scene;
+}
+
+// Root mean square of the differences over the pixels and channels of which use(x, y) is true, in what the host shows
+// over white paper in linear light.
+double difference(
+    const LinearPicture &a, const LinearPicture &b,
+    const std::function<bool(std::uint32_t, std::uint32_t)> &use = [](auto, auto) { return true; }) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            for (std::size_t c = 0; c < 3 && use(x, y); ++c, ++count) {
+                const auto shown = [&](const LinearPicture &of) {
+                    return std::min(double{of.value(x, y, c)} + double{of.value(x, y, 4 + c)}, 1.5);
+                };
+                sum += std::pow(shown(a) - shown(b), 2);
+            }
+    return std::sqrt(sum / static_cast<double>(count));
+}
+
+LinearPicture picture_of(SceneBuilder scene, const Options &options, const arhost_camera &view,
+                         std::optional<double> time_s = {}) {
+    LinearTracer tracer(std::move(scene), options, "rt_embree");
+    EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK) << tracer.log();
+    return tracer.render(view, 0, nullptr, time_s);
+}
+
+class Denoising : public testing::Test {
+protected:
+    explicit Denoising(const Options &options = denoised) : tracer_(still_life(), options, "rt_embree") {
+        EXPECT_EQ(tracer_.start(pinhole()), ARHOST_STATUS_OK) << tracer_.log();
+    }
+    LinearPicture next(double degrees) { return tracer_.render(turned(degrees), number_++); }
+
+    LinearTracer tracer_;
+    std::uint64_t number_ = 0;
+};
+
+TEST_F(Denoising, ConvergesWhileTheCameraRests) {
+    const LinearPicture truth = picture_of(still_life(), converged, turned(0));
+    const double noise = difference(picture_of(still_life(), noisy, turned(0)), truth);
+    EXPECT_LT(difference(next(0), truth), 0.6 * noise);
+    for (int i = 0; i < 30; ++i)
+        next(0);
+    EXPECT_LT(difference(next(0), truth), 0.2 * noise);
+}
+
+TEST(DenoisingOfMirrors, ConvergesWhileTheCameraRests) {
+    LinearTracer tracer(with_mirror_and_glass(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+    const LinearPicture truth = picture_of(with_mirror_and_glass(), converged, turned(0)),
+                        other = picture_of(still_life(), converged, turned(0));
+    const auto shows_them = [&](std::uint32_t x, std::uint32_t y) {
+        return truth.value(x, y, 4) == 0 && other.value(x, y, 4) > 0;
+    };
+    const double noise = difference(picture_of(with_mirror_and_glass(), noisy, turned(0)), truth, shows_them);
+    LinearPicture picture = tracer.render(turned(0), 0);
+    for (std::uint64_t i = 1; i < 16; ++i)
+        picture = tracer.render(turned(0), i);
+    EXPECT_LT(difference(picture, truth, shows_them), 0.4 * noise);
+}
+
+TEST_F(Denoising, FollowsTheCamera) {
+    for (int i = 0; i < 11; ++i)
+        next(0.7 * i);
+    const LinearPicture truth = picture_of(still_life(), converged, turned(0.7 * 11));
+    const double noise = difference(picture_of(still_life(), noisy, turned(0.7 * 11)), truth);
+    EXPECT_LT(difference(next(0.7 * 11), truth), 0.25 * noise);
+}
+
+// A tracer that takes four times as long as a frame of the video.
+TEST_F(Denoising, ConvergesIfFramesAreMissing) {
+    const LinearPicture truth = picture_of(still_life(), converged, turned(0));
+    const double noise = difference(picture_of(still_life(), noisy, turned(0)), truth);
+    for (int i = 0; i < 31; ++i, number_ += 3)
+        next(0);
+    EXPECT_LT(difference(next(0), truth), 0.2 * noise);
+}
+
+TEST_F(Denoising, RendersImagesOfAnySize) {
+    for (const auto &[w, h] : {std::pair{1u, 1u}, {1u, 40u}, {50u, 1u}, {17u, 5u}, {65u, 33u}}) {
+        LinearTracer tracer(still_life(), denoised, "rt_embree");
+        arhost_camera view = turned(0);
+        view.intrinsics = pinhole(w, h, w);
+        ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK) << tracer.log();
+        for (std::uint64_t i = 0; i < 5; ++i)
+            tracer.render(view, i);
+    }
+}
+
+TEST_F(Denoising, SmoothsEdges) {
+    std::set<std::uint16_t> shares; // of the table, where it ends at a ball
+    for (int i = 0; i < 15; ++i)
+        next(0);
+    const LinearPicture picture = next(0), truth = picture_of(still_life(), converged, turned(0));
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x) {
+            const float expected = truth.value(x, y, 4), share = picture.value(x, y, 4);
+            if (expected > 0 && expected < 0.5f && truth.value(x, y, 0) > 0)
+                shares.insert(picture.at(x, y)[4]);
+            if (expected == 0 || share == 0) {
+                EXPECT_NEAR(share, expected, 0.25) << x << ", " << y;
+            }
+        }
+    EXPECT_GT(shares.size(), 20u);
+}
+
+TEST_F(Denoising, LeavesOtherPixelsUntouched) {
+    for (int i = 0; i < 3; ++i)
+        next(0);
+    const LinearPicture picture = next(0);
+    EXPECT_EQ(picture.at(width / 2, 2), untouched); // above the table's end
+    EXPECT_EQ(picture.info.has_region, 1);
+}
+
+// Frames of a run with a new worker for each frame.
+TEST_F(Denoising, ImagesDependOnTheRequestOnly) {
+    const std::array<Options, 3> variants{{{{"samples", "1"}, {"denoise", "true"}, {"threads", "1"}},
+                                           {{"samples", "1"}, {"denoise", "true"}, {"threads", "3"}},
+                                           {{"samples", "1"}, {"denoise", "true"}, {"instruction_set", "base"}}}};
+    std::vector<std::unique_ptr<LinearTracer>> tracers;
+    for (const Options &options : variants) {
+        tracers.push_back(std::make_unique<LinearTracer>(still_life(), options, "rt_embree"));
+        ASSERT_EQ(tracers.back()->start(pinhole()), ARHOST_STATUS_OK);
+    }
+    for (std::uint64_t frame = 0; frame < 3; ++frame) {
+        const arhost_camera view = turned(0.5 * static_cast<double>(frame));
+        const LinearPicture expected = tracers[0]->render(view, frame);
+        for (std::size_t i = 1; i < tracers.size(); ++i) {
+            EXPECT_EQ(tracers[i]->render(view, frame).pixels(), expected.pixels()) << frame << ", variant " << i;
+            EXPECT_TRUE(std::ranges::equal(tracers[i]->state(), tracers[0]->state())) << frame << ", variant " << i;
+        }
+    }
+}
+
+TEST_F(Denoising, IgnoresAStateOfAnotherVersionOrSize) {
+    const LinearPicture first = next(0);
+    for (const std::size_t field : {0u, 4u, 8u}) { // version, width, height
+        number_ = 0;
+        ++reinterpret_cast<unsigned char *>(tracer_.state().data())[field];
+        EXPECT_EQ(next(0).pixels(), first.pixels()) << field;
+    }
+}
+
+TEST(DenoisingOptions, ExcludeAccumulation) {
+    PluginUnderTest plugin("rt_embree");
+    EXPECT_EQ(plugin.create({{"accumulate", "true"}, {"denoise", "true"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_NE(plugin.log().find("'accumulate' and 'denoise'"), std::string::npos) << plugin.log();
+}
+
+// After five frames, nothing is left of where a ball and its shadow were.
+TEST(DenoisingOfMotion, ForgetsWhatHasMoved) {
+    const auto make = [] {
+        scene::Settings settings;
+        settings.integrator = ARHOST_INTEGRATOR_PATH;
+        settings.ambient = glm::vec3(0);
+        settings.background = glm::vec3(0.4f);
+        settings.duration_s = 1;
+        SceneBuilder scene(settings);
+        scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
+        const scene::Motion motion{.moves = true, .node = scene.add_moving_node({-60, 0, 20}, {60, 0, 20})};
+        scene.add_animated("cube", cube(20), diffuse(0.7f, 0.2f, 0.1f), motion);
+        scene.add_light(bulb({0, -100, 250}, 40, 6e4f, ARHOST_FALLOFF_INVERSE_SQUARE));
+        return scene;
+    };
+    LinearTracer tracer(make(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+    for (std::uint64_t i = 0; i < 16; ++i)
+        tracer.render(turned(0), i, nullptr, 0.0);
+    LinearPicture picture = tracer.render(turned(0), 16, nullptr, 0.5);
+    for (std::uint64_t i = 17; i < 22; ++i)
+        picture = tracer.render(turned(0), i, nullptr, 0.5);
+    const LinearPicture truth = picture_of(make(), converged, turned(0), 0.5),
+                        past = picture_of(make(), converged, turned(0), 0.0);
+    const auto has_been_shadowed = [&](std::uint32_t x, std::uint32_t y) {
+        return past.value(x, y, 4) < truth.value(x, y, 4) - 0.1f;
+    };
+    EXPECT_LT(difference(picture, truth, has_been_shadowed), 0.1 * difference(past, truth, has_been_shadowed));
+}
+
+} // namespace
+} // namespace arhost::test
