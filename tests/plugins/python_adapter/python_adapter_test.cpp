@@ -378,10 +378,13 @@ TEST_F(PythonAdapter, ARaytracerCanObeyTheLimitOfSamples) {
                   "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}\n"
                   "live: {target_fps: 10000, min_samples: 2, max_latency_ms: 60000}\noutputs: [{plugin: sink_null}]\n"
                   "stats: stats.json\n");
-    EXPECT_EQ(run_script(run, "class R:\n"
+    // An image takes longer than the 0.1 ms of target_fps on any machine.
+    EXPECT_EQ(run_script(run, "import time\n"
+                              "class R:\n"
                               "    def __init__(self, host): self.host, self.seen = host, set()\n"
                               "    def start(self, setup): pass\n"
                               "    def render(self, request, image):\n"
+                              "        time.sleep(0.002)\n"
                               "        request.full_samples = 8\n"
                               "        image[...] = 0\n"
                               "        if request.max_samples not in self.seen:\n"
