@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Used by all ray tracer benchmarks: the test mesh, and an arhost_host that prints log messages.
+// Used by all ray tracer benchmarks: the test mesh, an arhost_host that prints log messages, and setups.
 #pragma once
 
 #include "scene/arena_builder.hpp"
 #include "scene/mesh_loader.hpp"
 
 #include <arhost/plugin.h>
+#include <arhost/raytracer.h>
 
 #include <glm/common.hpp>
 #include <glm/gtc/constants.hpp>
@@ -72,6 +73,35 @@ inline arhost_host printing_host(const char *name) {
             [](const arhost_host *, double, const char *) {},
             [](const arhost_host *) { return 0; },
             [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+}
+
+// Returns the intrinsics of a camera without distortion, whose principal point is in the middle of the image.
+inline arhost_intrinsics centred_pinhole(std::uint32_t width, std::uint32_t height, double focal_px) {
+    return {sizeof(arhost_intrinsics),
+            width,
+            height,
+            ARHOST_DISTORTION_NONE,
+            focal_px,
+            focal_px,
+            (width - 1) / 2.0,
+            (height - 1) / 2.0,
+            0,
+            0,
+            {},
+            {}};
+}
+
+// Returns the setup for linear images. Refers to both arguments.
+inline arhost_raytracer_setup linear_setup(const arhost_scene &scene, const arhost_intrinsics &intrinsics) {
+    arhost_raytracer_setup setup{};
+    setup.struct_size = sizeof setup;
+    setup.width = intrinsics.width;
+    setup.height = intrinsics.height;
+    setup.form = ARHOST_IMAGE_FORM_LINEAR;
+    setup.scene = &scene;
+    setup.intrinsics = &intrinsics;
+    setup.compositing = ARHOST_COMPOSITING_LINEAR;
+    return setup;
 }
 
 } // namespace arhost::bench

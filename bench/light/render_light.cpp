@@ -28,18 +28,7 @@ void run(int argc, char **argv) {
             "usage: render-light SCENE OUT WIDTH HEIGHT FOCAL EYE AT UP SAMPLES FRAMES [KEY=VALUE...]");
     const auto number = [&](int i) { return std::strtod(argv[i], nullptr); };
     const auto width = static_cast<std::uint32_t>(number(3)), height = static_cast<std::uint32_t>(number(4));
-    const arhost_intrinsics intrinsics{sizeof(arhost_intrinsics),
-                                       width,
-                                       height,
-                                       ARHOST_DISTORTION_NONE,
-                                       number(5),
-                                       number(5),
-                                       (width - 1) / 2.0,
-                                       (height - 1) / 2.0,
-                                       0,
-                                       0,
-                                       {},
-                                       {}};
+    const arhost_intrinsics intrinsics = arhost::bench::centred_pinhole(width, height, number(5));
     const arhost_camera camera{sizeof(arhost_camera),
                                0,
                                {number(6), number(7), number(8)},
@@ -84,14 +73,7 @@ void run(int argc, char **argv) {
     }
     const arhost::scene::Arena arena = arhost::scene::load_scene(argv[1]).build();
     const arhost_host host = arhost::bench::printing_host("render-light");
-    arhost_raytracer_setup setup{};
-    setup.struct_size = sizeof setup;
-    setup.width = width;
-    setup.height = height;
-    setup.form = ARHOST_IMAGE_FORM_LINEAR;
-    setup.scene = &arena.scene();
-    setup.intrinsics = &intrinsics;
-    setup.compositing = ARHOST_COMPOSITING_LINEAR;
+    const arhost_raytracer_setup setup = arhost::bench::linear_setup(arena.scene(), intrinsics);
     rt_embree::Renderer renderer(setup, settings, arhost::Host(&host));
     std::vector<std::uint16_t> pixels(std::size_t{8} * width * height);
     const arhost_image image{sizeof(arhost_image), 16 * width, width, height, nullptr, pixels.data(), nullptr};

@@ -36,11 +36,6 @@ using Codes = std::vector<float>; // R, G, B of each pixel, not rounded
 enum Kind { outside, catcher, diffuse, glossy, specular, kind_count };
 constexpr std::array<const char *, kind_count> names{"outside", "catcher", "diffuse", "glossy", "mirror, glass"};
 
-struct Camera {
-    arhost_camera camera;
-    std::uint32_t width, height;
-};
-
 arhost_camera orbiting(const arhost_intrinsics &intrinsics, double degrees) {
     const double angle = degrees * M_PI / 180;
     return {sizeof(arhost_camera),
@@ -172,28 +167,10 @@ void run(int argc, char **argv) {
     }
     const auto width = static_cast<std::uint32_t>(value["width"]),
                height = static_cast<std::uint32_t>(value["height"]);
-    const arhost_intrinsics intrinsics{sizeof(arhost_intrinsics),
-                                       width,
-                                       height,
-                                       ARHOST_DISTORTION_NONE,
-                                       1.15 * width,
-                                       1.15 * width,
-                                       (width - 1) / 2.0,
-                                       (height - 1) / 2.0,
-                                       0,
-                                       0,
-                                       {},
-                                       {}};
+    const arhost_intrinsics intrinsics = arhost::bench::centred_pinhole(width, height, 1.15 * width);
     const arhost::scene::Arena arena = arhost::scene::load_scene(argv[1]).build();
     const arhost_host host = arhost::bench::printing_host("render-noise");
-    arhost_raytracer_setup setup{};
-    setup.struct_size = sizeof setup;
-    setup.width = width;
-    setup.height = height;
-    setup.form = ARHOST_IMAGE_FORM_LINEAR;
-    setup.scene = &arena.scene();
-    setup.intrinsics = &intrinsics;
-    setup.compositing = ARHOST_COMPOSITING_LINEAR;
+    const arhost_raytracer_setup setup = arhost::bench::linear_setup(arena.scene(), intrinsics);
     rt_embree::Settings settings;
     settings.threads = static_cast<unsigned>(value["threads"]);
     settings.light_samples = static_cast<std::int32_t>(value["light_samples"]);

@@ -19,9 +19,6 @@ ARHOST_INLINE void store3(float *const *rows, std::ptrdiff_t at, Vec3 a) {
 ARHOST_INLINE Vec3 gather3(const float *const *rows, Int at) {
     return {gather(rows[0], at), gather(rows[1], at), gather(rows[2], at)};
 }
-ARHOST_INLINE const float *const *rows_of(float *const *rows) {
-    return const_cast<const float *const *>(rows);
-}
 
 // Index of a pixel in guides and light, and in histories.
 ARHOST_INLINE std::ptrdiff_t guide_at(const Denoising &denoising, int x, int y) {
@@ -179,8 +176,7 @@ ARHOST_INLINE Float limit_by_neighbours(const Denoising &denoising, std::ptrdiff
                 continue;
             const std::ptrdiff_t there = at + dy * denoising.guide_stride() + dx;
             const Bool same = surfaces_at(denoising, there) == surface;
-            brightest =
-                max(brightest, select(same, luminance(load3(rows_of(denoising.light[0]), there)), Float(0.0f)));
+            brightest = max(brightest, select(same, luminance(load3(denoising.light[0], there)), Float(0.0f)));
             count = count + select(same, Float(1.0f), Float(0.0f));
         }
     return select(count < Float(3.0f), Float(far_away), brightest * Float(1.5f) + Float(0.02f));
@@ -193,7 +189,7 @@ ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, std::ptrd
     const Bool borrows = is_kind(surface, real_surface);
     if (denoising.catcher_phase >= 0 && any(borrows)) // nearer pixels may have the same light
         limit = select(borrows, limit_by_neighbours(denoising, at, row, surface, 2), limit);
-    const Vec3 light = load3(rows_of(denoising.light[0]), at);
+    const Vec3 light = load3(denoising.light[0], at);
     const Float value = luminance(light);
     return light * select(value > limit, limit / max(value, Float(1e-6f)), Float(1.0f));
 }
@@ -215,7 +211,7 @@ ARHOST_INLINE void accumulate(const Frame &frame, std::int32_t row) {
                 store(to + at, Float(0.0f));
             continue;
         }
-        const float *const *guides = rows_of(denoising.guides);
+        const float *const *guides = denoising.guides;
         const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
         const Vec3 light = light_without_fireflies(denoising, at, row, surface);
         const Past past = past_of(frame, position, normal, surface, active);
@@ -284,9 +280,9 @@ constexpr float least_variance = 1e-6f;
 ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
     const Denoising &denoising = *frame.denoising;
     const int step = 1 << pass;
-    const float *const *from = rows_of(denoising.light[(pass + 1) & 1]);
+    const float *const *from = denoising.light[(pass + 1) & 1];
     float *const *to = denoising.light[pass & 1];
-    const float *const *guides = rows_of(denoising.guides);
+    const float *const *guides = denoising.guides;
     const std::ptrdiff_t down = denoising.guide_stride();
     for (std::int32_t x = 0; x < denoising.width; x += lanes) {
         const std::ptrdiff_t at = guide_at(denoising, x, row);
@@ -362,7 +358,7 @@ constexpr unsigned only_own = 0x44444444;
 // Returns the pixels of a row that differ from a neighbour.
 ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
     const Denoising &denoising = *frame.denoising;
-    const float *const *guides = rows_of(denoising.guides);
+    const float *const *guides = denoising.guides;
     const std::ptrdiff_t at = guide_at(denoising, x, y), down = denoising.guide_stride();
     const Int surface = surfaces_at(denoising, at);
     const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
@@ -408,7 +404,7 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
             return;
         const Bool edges = ((Int(static_cast<int>(edge_lanes)) >> lane_numbers()) & Int(1)) == Int(1);
         const Int x = Int(x0) + (lane_numbers() & Int(block - 1)), y = Int(y0) + (lane_numbers() >> Int(2));
-        const float *const *guides = rows_of(denoising.guides);
+        const float *const *guides = denoising.guides;
         Int taps(0);
         for (int i = 0; i < tap_count; ++i) {
             // A lattice with a different row and column for each ray.
@@ -463,8 +459,8 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
 // Writes a row of the image. `passes`: of the filter.
 ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row, int passes) {
     const Denoising &denoising = *frame.denoising;
-    const float *const *from = rows_of(denoising.light[(passes + 1) & 1]);
-    const float *const *guides = rows_of(denoising.guides);
+    const float *const *from = denoising.light[(passes + 1) & 1];
+    const float *const *guides = denoising.guides;
     Rectangle drawn{denoising.width, row, 0, row + 1};
     for (std::int32_t x = 0; x < denoising.width; x += lanes) {
         const int width = denoising.width - x < lanes ? denoising.width - x : lanes;

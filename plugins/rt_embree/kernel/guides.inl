@@ -61,8 +61,9 @@ ARHOST_INLINE Vec3 divisor_of(const Surface &s) {
     return {of(s.diffuse.x, gloss.x), of(s.diffuse.y, gloss.y), of(s.diffuse.z, gloss.z)};
 }
 
-// Follows rays through mirrors and glass, always the way of most light, to what the pixels show there. Replaces the
-// guides of these pixels: normal and albedo, as they are seen, and the point where the surface seems to be.
+// Traces rays through mirrors and glass, at each vertex along the branch with the larger throughput, to the first
+// surface of another kind. Replaces the guides of these pixels: the normal of that surface, its albedo times the
+// throughput, and the position of its virtual image.
 ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction, int first_pixel, Bool specular) {
     const Frame &frame = work.frame;
     const Scene &scene = frame.scene;
