@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Noise and time of rt_embree's path integrator, with and without `denoise`: tools/bench noise [--quick]. Method:
+"""Noise and time of rt_embree's path integrator, denoised and not: tools/bench noise [--quick]. Method:
 bench/noise/README.md."""
 import gzip
 import os

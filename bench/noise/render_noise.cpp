@@ -4,8 +4,8 @@
 //   render-noise SCENE [KEY=VALUE...]
 // Renders frames like a run does, with the state of each frame passed to the next, blends them with a grey video, and
 // compares them with converged pictures. Prints, by kind of surface, the RMS difference in codes, and the temporal
-// standard deviation if the camera stands still. Keys: width, height, samples, light_samples, denoise, threads,
-// frames, orbit (degrees per frame), reference (frames of 64 samples), out (folder for the pictures).
+// standard deviation if the camera stands still. Keys: width, height, samples, light_samples, photons, denoise,
+// threads, frames, orbit (degrees per frame), reference (frames of 64 samples), out (folder for the pictures).
 #include "bunny.hpp"
 #include "pixels/linear.hpp"
 #include "raytracer_common/scene_geometry.hpp"
@@ -152,9 +152,9 @@ double median(std::vector<double> values) {
 }
 
 void run(int argc, char **argv) {
-    std::map<std::string, double> value{{"width", 640},       {"height", 480}, {"samples", 1},
-                                        {"light_samples", 4}, {"denoise", 1},  {"threads", 0},
-                                        {"frames", 16},       {"orbit", 0},    {"reference", 8}};
+    std::map<std::string, double> value{{"width", 640}, {"height", 480}, {"samples", 1},       {"light_samples", 4},
+                                        {"denoise", 1}, {"threads", 0},  {"photons", 1 << 14}, {"frames", 16},
+                                        {"orbit", 0},   {"reference", 8}};
     std::string out;
     for (int i = 2; i < argc; ++i) {
         const std::string argument = argv[i], key = argument.substr(0, argument.find('='));
@@ -176,6 +176,7 @@ void run(int argc, char **argv) {
     settings.light_samples = static_cast<std::int32_t>(value["light_samples"]);
     rt_embree::Settings converged = settings;
     settings.samples = static_cast<std::uint32_t>(value["samples"]);
+    settings.photons = static_cast<std::uint32_t>(value["photons"]);
     settings.denoise = value["denoise"] != 0;
     converged.samples = 64;
     Run noisy(setup, settings, arhost::Host(&host)), reference(setup, converged, arhost::Host(&host));

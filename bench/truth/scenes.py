@@ -69,7 +69,7 @@ def scene(light, bunny, table_roughness=0):
 
 
 def demo_light():
-    """That of config/scenes/demo.yaml."""
+    """A lamp by guess, with the integrator `whitted`."""
     return ["version: 1", "ambient: 0.28", "background: '#c9d6e4'", "lights:",
             "  - {type: rectangle, position: [-640, 702, 710], direction: [0.674, -0.739, 0], size: [800, 940], "
             "intensity: [1.25, 1.3, 1.38]}"]

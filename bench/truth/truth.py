@@ -109,7 +109,7 @@ def augmented(room, rig, light, table_roughness=0):
     with open(os.path.join(folder, "run.yaml"), "w", encoding="utf-8") as out:
         out.write("version: 1\nsource: {plugin: source_file, path: plate-%d.png, fps: 25}\ntrajectory: cameras.jsonl\n"
                   "raytracer: {plugin: rt_embree, scene: scene.yaml, deadline_ms: 100000, "
-                  "options: {samples: 256, light_samples: 4}}\n"
+                  "options: {quality: reference, samples: 256}}\n"
                   "outputs: [{plugin: sink_images, path: out-%d.png}]\n")
     ran = subprocess.run([os.path.join(BIN, "arhost"), "run.yaml"], cwd=folder, stderr=subprocess.PIPE, text=True, check=False)
     if ran.returncode != 0:

@@ -373,4 +373,14 @@ std::vector<float> environment_irradiance(const arhost_scene &arena) {
     return irradiance;
 }
 
+float brightest_texel(const arhost_scene &arena) {
+    if (arena.environment.texture == ARHOST_NONE)
+        return 0;
+    const arhost_texture &image = elements<arhost_texture>(arena, arena.textures)[arena.environment.texture];
+    float brightest = 0;
+    for (const auto &texel : elements<std::array<float, 4>>(arena, image.texels))
+        brightest = std::max(brightest, 0.2126f * texel[0] + 0.7152f * texel[1] + 0.0722f * texel[2]);
+    return brightest;
+}
+
 } // namespace arhost::raytracer_common

@@ -52,6 +52,8 @@ public:
     // bright the room is, if it reflects 35 % of its light. 0: neither lamps, environment, sampled emissive surfaces
     // nor a video give light. `video`: NULL if it is unknown.
     float least_irradiance(const VideoImage *video) const;
+    // Light in the middle of the virtual objects: irradiance / π at perpendicular incidence.
+    float light() const { return light_; }
     std::span<const Emitter> emitters() const { return emitters_; } // one per object
     // Spheres that contain the visible virtual objects, at most max_spheres.
     static constexpr std::size_t max_spheres = 16;
@@ -82,5 +84,7 @@ private:
 // an environment.
 inline constexpr std::uint32_t irradiance_width = 64, irradiance_height = 32;
 std::vector<float> environment_irradiance(const arhost_scene &arena);
+// The largest luminance of the environment's texels before they are scaled; 0 without an environment.
+float brightest_texel(const arhost_scene &arena);
 
 } // namespace arhost::raytracer_common

@@ -54,7 +54,7 @@ double lit_area(std::span<const Photon> photons, const std::array<float, 3> &low
 
 } // namespace
 
-void PhotonMap::build(std::span<const Photon> photons) {
+void PhotonMap::build(std::span<const Photon> photons, bool sorts, float negligible) {
     photons_.clear();
     levels_.clear();
     std::ranges::copy_if(photons, std::back_inserter(photons_),
@@ -83,7 +83,37 @@ void PhotonMap::build(std::span<const Photon> photons) {
     for (std::size_t i = 0; i < levels_.size(); ++i) {
         if (i > 0)
             levels_[i].radius = levels_[i - 1].radius / 2;
-        sort(photons_, low_, levels_[i]);
+        if (sorts)
+            sort(photons_, low_, levels_[i]);
+    }
+    mark_near(negligible);
+}
+
+void PhotonMap::mark_near(float negligible) {
+    near_.assign(near_bits / 32, 0);
+    using Cell = std::array<std::int32_t, 3>;
+    const float side = 2 * levels_[0].radius;
+    std::vector<std::pair<Cell, float>> powers(photons_.size());
+    std::ranges::transform(photons_, powers.begin(), [&](const Photon &photon) {
+        Cell cell;
+        for (std::size_t i = 0; i < 3; ++i)
+            cell[i] = cell_at(photon.position[i], low_[i], side);
+        return std::pair(cell, std::max({photon.power[0], photon.power[1], photon.power[2]}));
+    });
+    std::ranges::sort(powers);
+    for (auto next = powers.begin(); next != powers.end();) {
+        const Cell cell = next->first;
+        float power = 0;
+        for (; next != powers.end() && next->first == cell; ++next)
+            power += next->second;
+        if (power < negligible * side * side)
+            continue;
+        for (int neighbour = 0; neighbour < 27; ++neighbour) {
+            const std::uint32_t bit = PhotonGrid::hash(cell[0] + neighbour % 3 - 1, cell[1] + neighbour / 3 % 3 - 1,
+                                                       cell[2] + neighbour / 9 - 1) %
+                                      near_bits;
+            near_[bit / 32] |= static_cast<std::int32_t>(1u << bit % 32);
+        }
     }
 }
 

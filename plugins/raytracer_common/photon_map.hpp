@@ -49,15 +49,24 @@ public:
     static constexpr std::size_t max_levels = 6;
     static constexpr int photons_per_estimate = 24; // about
 
-    // Keeps the photons that arrived somewhere.
-    void build(std::span<const Photon> photons);
+    // Keeps the photons that arrived somewhere. `sorts`: else the levels only have a radius. `negligible`: near()
+    // does not have cells whose photons bring less than this irradiance, divided by π.
+    void build(std::span<const Photon> photons, bool sorts = true, float negligible = 0);
+
     std::span<const Photon> photons() const { return photons_; }
     std::span<const PhotonGrid> levels() const { return levels_; } // empty if no photon arrived
-    const std::array<float, 3> &low() const { return low_; }       // mm: corner of cell (0, 0, 0) of all grids
+    // A bit for each number PhotonGrid::hash() modulo near_bits: set for the cells of the first level that contain
+    // photons, and for their neighbours.
+    static constexpr std::int32_t near_bits = 1 << 16;
+    std::span<const std::int32_t> near() const { return near_; }
+    const std::array<float, 3> &low() const { return low_; } // mm: corner of cell (0, 0, 0) of all grids
 
 private:
+    void mark_near(float negligible);
+
     std::vector<Photon> photons_;
     std::vector<PhotonGrid> levels_;
+    std::vector<std::int32_t> near_;
     std::array<float, 3> low_{};
 };
 

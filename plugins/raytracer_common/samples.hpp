@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sample positions in a pixel. They are the same in every pixel, and in all ray tracers of arhost.
+// Number and positions of the samples in a pixel. The positions are the same in every pixel, and in all ray tracers
+// of arhost.
 #pragma once
 
 #include <arhost/raytracer.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 namespace arhost::raytracer_common {
+
+// Values of the option `quality`.
+inline constexpr const char *qualities[] = {"realtime", "balanced", "reference", nullptr};
+constexpr std::uint32_t samples_of(std::string_view quality) {
+    return quality == "realtime" ? 1 : quality == "balanced" ? 4 : 64;
+}
 
 // Returns the number of samples per pixel for this request.
 inline std::uint32_t limited(std::uint32_t full_samples, const arhost_render_request &request) {

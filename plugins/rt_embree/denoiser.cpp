@@ -82,7 +82,7 @@ void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
 
 const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
                                  std::span<const arhost::raytracer_common::PlacedObject> objects, bool deforms,
-                                 std::uint32_t sequence, std::uint32_t samples) {
+                                 std::uint32_t sequence, std::uint32_t samples, std::int32_t flat_catcher) {
     if (static_cast<std::uint32_t>(denoising_.width) != intrinsics.width ||
         static_cast<std::uint32_t>(denoising_.height) != intrinsics.height)
         resize(intrinsics.width, intrinsics.height);
@@ -114,6 +114,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     denoising_.camera_moved = false;
     denoising_.pixel_angle = static_cast<float>(1 / intrinsics.fx);
     denoising_.most_frames = 32;
+    denoising_.flat_surface = flat_catcher < 0 ? 0 : surface_number(flat_catcher, real_surface);
     // The numbers of frames may have gaps, such as three of four.
     constexpr std::array<std::int32_t, 4> phases{0, 3, 1, 2};
     denoising_.catcher_phase = phases[(header.first + header.frames) % 4];

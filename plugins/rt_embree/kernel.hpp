@@ -152,11 +152,34 @@ struct PhotonGrid {
     std::int32_t bucket_mask; // number of buckets − 1
     float radius;
 };
+// See TracePhotons.
+inline constexpr std::int32_t virtual_face = 6;
+
+// The photons of one face in a cell of a grid whose side is twice the radius of a PhotonGrid.
+struct PhotonCell {
+    static constexpr int floats = 8;
+    float power[3];     // sum
+    float direction[3]; // sum of the directions along which they arrive, weighted by power
+    std::int32_t count;
+    std::uint32_t key; // of cell and face
+
+    static std::uint32_t key_of(std::int32_t x, std::int32_t y, std::int32_t z, std::int32_t face) {
+        return static_cast<std::uint32_t>(x) * 2654435761u + static_cast<std::uint32_t>(y) * 2246822519u +
+               static_cast<std::uint32_t>(z) * 3266489917u + static_cast<std::uint32_t>(face);
+    }
+};
+static_assert(sizeof(PhotonCell) == PhotonCell::floats * sizeof(float));
+
 struct Photons {
     const float *photons; // nine floats each, as in Photon
+    const std::int32_t *near;
     float low[3];
     PhotonGrid levels[arhost::raytracer_common::PhotonMap::max_levels];
     std::int32_t level_count;
+    // With denoising: hash tables of PhotonCell, cells_per_level for each level. A cell is at the index
+    // PhotonGrid::hash() modulo cells_per_level, a power of two, or follows it; a cell with count 0 ends the search.
+    const float *cells;
+    std::int32_t cells_per_level;
 };
 
 inline constexpr std::int32_t most_few_sources = 16;
@@ -178,6 +201,9 @@ struct PathScene {
     // The change of a catcher's light is relative to at least this irradiance / π, so that a catcher in the dark does
     // not flicker (LightSources::least_irradiance). 0: catchers do not change.
     float least_irradiance;
+    // The object that find_unchanged() of region.inl finds: a flat catcher; −1: none.
+    std::int32_t wide_catcher;
+    float brightest_texel; // of the environment, not multiplied by its intensity
     Video video;
     Caustics caustics;
     Photons photons;
@@ -188,12 +214,27 @@ struct Camera {
     float world_from_camera[9]; // column-major
 };
 
+// Kinds of surfaces.
+enum SurfaceKind : std::int32_t {
+    scattering_surface,
+    specular_surface, // mirrors and glass
+    real_surface,
+    glossy_surface
+};
+constexpr std::int32_t surface_number(std::int32_t object, SurfaceKind kind) {
+    return 4 * (object + 1) + kind;
+}
+constexpr std::int32_t most_surfaces = 1 << 20;
+// PathScene::wide_catcher where virtual objects do not change it.
+constexpr std::int32_t unchanged_surface = most_surfaces - 4 + real_surface;
+
 // Of the surface that the ray through the centre of a pixel meets, for the denoiser.
 enum GuideRow : int {
     position_guide,                    // three rows: mm, in world axes
     normal_guide = position_guide + 3, // three rows: unit vector
     albedo_guide = normal_guide + 3,   // three rows: the factor of the denoised light
-    surface_guide = albedo_guide + 3,  // an int's bits: number of the surface (surface_of() in guides.inl); 0: none
+    surface_guide = albedo_guide + 3,  // an int's bits: number of the surface (surface_of() in guides.inl); 0: none;
+                                       // unchanged_surface: the other guides and the light are not set
     guide_rows
 };
 
@@ -217,8 +258,8 @@ enum HistoryRow : int {
 // sides of a row, without a surface.
 struct Denoising {
     static constexpr std::int32_t margin = 16;
-    static constexpr std::size_t most_objects = (1u << 18) - 2; // limit of surface_of()
-    std::int32_t width, height, stride;                         // px
+    static constexpr std::size_t most_objects = most_surfaces / 4 - 2;
+    std::int32_t width, height, stride; // px
     float *guides[guide_rows];
     float *light[2][light_rows];       // each step of the filter reads one and writes the other
     unsigned *taps;                    // of pixels at edges: see tap_count in denoise.inl
@@ -226,8 +267,9 @@ struct Denoising {
     float *after[history_rows];
     Camera camera_before;
     bool camera_moved;
-    float pixel_angle; // width of a pixel in the middle of the image, in units of its distance
-    float most_frames; // that count in the means
+    float pixel_angle;         // width of a pixel in the middle of the image, in units of its distance
+    float most_frames;         // that count in the means
+    std::int32_t flat_surface; // number of that of PathScene::wide_catcher; 0: there is none
     // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels.
     std::int32_t catcher_phase;
     std::uint32_t first_random_of_catchers; // as Frame::first_random
@@ -291,6 +333,14 @@ struct DeferredCatchers {
     std::int32_t count;
 };
 
+// Rectangles in the plane z = 1 of camera axes: bounds of the projections of objects. A ray through none of them
+// meets none of these objects.
+struct Windows {
+    static constexpr std::int32_t most = 16;
+    float bounds[most][4]; // x0, y0, x1, y1
+    std::int32_t count;    // −1: unknown
+};
+
 // A thread's working memory for one tile. The arrays have one value per pixel, in the order of Rays::blocks.
 struct Scratch {
     // Results of the current sample, per colour channel: plane_count planes of tile_pixels each.
@@ -298,16 +348,20 @@ struct Scratch {
     float *sum[sum_rows]; // sums over all samples
     float *guide[guide_rows];
     DeferredCatchers deferred;
-    RayQueue *queues; // one queue per depth, from 0 to Scene::max_depth
+    Windows virtual_windows; // of virtual objects; unknown if there are occluders
+    Windows windows;         // of all objects but PathScene::wide_catcher and occluders
+    RayQueue *queues;        // one queue per depth, from 0 to Scene::max_depth
 };
 
 // Renders a tile. Returns the bounding rectangle of the pixels with non-zero alpha, enlarged to whole blocks of 4×4
 // pixels. If there are no such pixels, the rectangle has x1 <= x0.
 using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &scratch);
 
-// Traces the photons with the numbers from `first` on; `to`: one element per photon.
+// Traces the photons with the numbers from `first` on. `to`, `faces`: one element per photon. The face of a photon is
+// virtual_face if it arrived at a virtual surface. At a real one, it is 2 · axis of the largest component of the
+// normal, plus 1 if this component is positive.
 using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint32_t count,
-                              arhost::raytracer_common::Photon *to);
+                              arhost::raytracer_common::Photon *to, std::int8_t *faces);
 
 // A step of the denoiser on one row of the image, or on one tile. `pass`: of the filter.
 using DenoiseRow = void (*)(const Frame &frame, std::int32_t row, int pass);
@@ -327,8 +381,8 @@ struct Kernel {
 namespace base {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
-                   arhost::raytracer_common::Photon *to);
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
+                   std::int8_t *faces);
 void accumulate_row(const Frame &frame, std::int32_t row, int);
 void filter_row(const Frame &frame, std::int32_t row, int pass);
 void find_taps(const Frame &frame, const Tile &tile);
@@ -337,8 +391,8 @@ Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
 namespace avx2 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
-                   arhost::raytracer_common::Photon *to);
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
+                   std::int8_t *faces);
 void accumulate_row(const Frame &frame, std::int32_t row, int);
 void filter_row(const Frame &frame, std::int32_t row, int pass);
 void find_taps(const Frame &frame, const Tile &tile);
@@ -347,8 +401,8 @@ Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
 namespace avx512 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
-                   arhost::raytracer_common::Photon *to);
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
+                   std::int8_t *faces);
 void accumulate_row(const Frame &frame, std::int32_t row, int);
 void filter_row(const Frame &frame, std::int32_t row, int pass);
 void find_taps(const Frame &frame, const Tile &tile);

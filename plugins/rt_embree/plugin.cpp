@@ -14,16 +14,13 @@ namespace {
 class Plugin {
 public:
     Plugin(const arhost::Host &host, const arhost::Options &options) : host_(host) {
-        settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
+        quality_ = options.text("quality");
+        settings_.samples = samples_of(options);
         settings_.threads = static_cast<unsigned>(options.integer("threads"));
         settings_.robust = options.boolean("robust");
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
-        settings_.denoise = options.boolean("denoise");
-        if (settings_.accumulate && settings_.denoise)
-            throw arhost::Failure(
-                ARHOST_STATUS_ERROR_CONFIGURATION,
-                "the options 'accumulate' and 'denoise' exclude each other; set one of them to false");
+        settings_.denoise = quality_ != "reference" && !settings_.accumulate;
         settings_.single_path = options.text("glass") == "path";
         settings_.photons = static_cast<std::uint32_t>(options.integer("photons"));
         if (const double bound = options.real("max_radiance"); bound > 0)
@@ -40,18 +37,17 @@ public:
                    std::to_string(setup.scene->objects.count) + " objects, " +
                    std::to_string(renderer_->thread_count()) + " threads, instruction set " +
                    renderer_->kernel_name());
-        if (settings_.denoise && renderer_->state_size() == 0)
-            host_.info(
-                "the option 'denoise' has no effect: the scene has the integrator 'whitted', a glossy catcher, or "
-                "too many objects");
+        if (settings_.denoise && setup.scene->integrator == ARHOST_INTEGRATOR_PATH && renderer_->state_size() == 0)
+            host_.info("images are not denoised: the scene has a glossy catcher, or too many objects");
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
         const bool is_complete = request.struct_size >= sizeof request; // an older host's struct lacks fields
+        const bool has_state = is_complete && request.state_size >= renderer_->state_size();
         const Rectangle drawn = renderer_->render(
             request.camera, image, request.motion, is_complete ? request.video : nullptr, request.sequence,
-            is_complete ? StateSlots{request.state_before, request.state_after} : StateSlots{});
+            has_state ? StateSlots{request.state_before, request.state_after} : StateSlots{});
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
             info.region_x = static_cast<std::uint32_t>(drawn.x0);
@@ -66,7 +62,7 @@ public:
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};
     void set(const arhost::Options &changed) {
         if (changed.contains("samples"))
-            settings_.samples = static_cast<std::uint32_t>(changed.integer("samples"));
+            settings_.samples = samples_of(changed);
         else
             renderer_->set_light_samples(static_cast<std::int32_t>(changed.integer("light_samples")));
     }
@@ -76,8 +72,14 @@ public:
     void stop() { renderer_.reset(); }
 
 private:
+    std::uint32_t samples_of(const arhost::Options &options) const {
+        const auto samples = static_cast<std::uint32_t>(options.integer("samples"));
+        return samples > 0 ? samples : arhost::raytracer_common::samples_of(quality_);
+    }
+
     arhost::Host host_;
     Settings settings_;
+    std::string quality_;
     std::optional<Renderer> renderer_;
 };
 
@@ -85,13 +87,18 @@ constexpr const char *glass[] = {"tree", "path", nullptr};
 constexpr const char *instruction_sets[] = {"auto", "avx512", "avx2", "base", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Primary rays per pixel, evenly spread over the pixel.", 1,
-                   256),
+    arhost::option(ARHOST_OPTION_TEXT, "quality", "realtime",
+                   "'realtime': 1 sample per pixel; 'balanced': 4; 'reference': 64. The path integrator denoises the "
+                   "first two, with the light of earlier frames.",
+                   0, 0, arhost::raytracer_common::qualities),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "0",
+                   "Primary rays per pixel, evenly spread over the pixel; 0: as many as 'quality' says.", 0, 256),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
                    "Shadow rays from each shaded point to each area light and to the environment.", 1, 256),
     arhost::option(
         ARHOST_OPTION_BOOL, "accumulate", "false",
-        "Average over frames while the camera and scene are static; each image then depends on earlier frames."),
+        "Average over frames while the camera and scene are static, instead of denoising; each image then depends on "
+        "earlier frames."),
     arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
                    "Rays traced at glass; 'tree': both the reflected and the refracted ray; 'path': one of them, "
                    "chosen at random.",
@@ -100,8 +107,6 @@ constexpr arhost_option_descriptor options[] = {
                    "Path integrator: bound of each sample's radiance, in multiples of white, so that single bright "
                    "paths make no fireflies; 0: none.",
                    0, 1e6),
-    arhost::option(ARHOST_OPTION_BOOL, "denoise", "false",
-                   "Path integrator: denoise, with the light of earlier frames."),
     arhost::option(ARHOST_OPTION_INTEGER, "photons", "16384",
                    "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
                    "0: none.",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
+#include "object_windows.hpp"
 #include "raytracer_common/scene_geometry.hpp"
 #include "raytracer_common/slow_image.hpp"
 #include "raytracer_common/view.hpp"
@@ -20,34 +21,6 @@ namespace {
 
 using arhost::Failure;
 using arhost::raytracer_common::Pose, arhost::raytracer_common::same_view;
-using Vec3d = arhost::shading::Vec3T<double>;
-
-// Returns the bounding rectangle of a box projected onto the plane z = 1; empty if the whole box is behind the
-// camera.
-Window window_of(const Box &box, const Pose &pose) {
-    const double infinity = std::numeric_limits<double>::infinity();
-    Window window{infinity, infinity, -infinity, -infinity, false};
-    int behind = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-        const Vec3d p = Vec3d{corner & 1 ? box.max[0] : box.min[0], corner & 2 ? box.max[1] : box.min[1],
-                              corner & 4 ? box.max[2] : box.min[2]} -
-                        pose.eye;
-        const double z = dot(p, pose.forward);
-        if (!(z > 1e-6 * (std::abs(dot(p, pose.right)) + std::abs(dot(p, pose.down))))) {
-            ++behind;
-            continue;
-        }
-        const double x = dot(p, pose.right) / z, y = dot(p, pose.down) / z;
-        // The margin exceeds the error of single-precision ray directions and origins.
-        const double margin = 1e-5 * (1 + std::abs(x) + std::abs(y)) + 1e-6 * length(pose.eye) / z;
-        window.x0 = std::min(window.x0, x - margin);
-        window.y0 = std::min(window.y0, y - margin);
-        window.x1 = std::max(window.x1, x + margin);
-        window.y1 = std::max(window.y1, y + margin);
-    }
-    window.unbounded = behind > 0 && behind < 8;
-    return window;
-}
 
 Camera camera_of(const Pose &pose) {
     Camera camera;
@@ -163,6 +136,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     if (setup.scene->integrator == ARHOST_INTEGRATOR_PATH) {
         lights_.emplace(*setup.scene);
         irradiance_ = arhost::raytracer_common::environment_irradiance(*setup.scene);
+        brightest_texel_ = arhost::raytracer_common::brightest_texel(*setup.scene);
         place_lights();
     }
     if (settings.denoise && lights_ && !scene_.view().has_gloss &&
@@ -230,26 +204,40 @@ void Renderer::trace_photons(Frame &frame) {
     caustics.photon_count = count;
     caustics.first_number = frame.first_random * photons_per_sample_;
     photons_.resize(count);
+    photon_faces_.resize(count);
     threads_.for_each((count + chunk - 1) / chunk, [&](std::size_t i, std::size_t) {
         const auto first = static_cast<std::uint32_t>(i) * chunk;
         if (frame.goes_on(frame.progress))
-            kernel_.trace_photons(frame, first, std::min(chunk, count - first), photons_.data() + first);
+            kernel_.trace_photons(frame, first, std::min(chunk, count - first), photons_.data() + first,
+                                  photon_faces_.data() + first);
     });
     if (!frame.goes_on(frame.progress))
         return;
-    photon_map_.build(photons_);
+    // Denoising leaves out light that is too weak to be seen.
+    photon_map_.build(photons_, !frame.denoising, frame.denoising ? lights_->light() / 1024 : 0);
     Photons &photons = frame.path.photons;
     if (photon_map_.photons().empty())
         return;
     photons.photons = photon_map_.photons().data()->position;
+    photons.near = photon_map_.near().data();
     std::copy_n(photon_map_.low().data(), 3, photons.low);
     for (const arhost::raytracer_common::PhotonGrid &from : photon_map_.levels())
         photons.levels[photons.level_count++] = {from.numbers.data(), from.starts.data(),
-                                                 static_cast<std::int32_t>(from.starts.size() - 2), from.radius};
+                                                 static_cast<std::int32_t>(from.starts.size()) - 2, from.radius};
+    if (frame.denoising)
+        photon_sums_.build(photon_map_, photons_, photon_faces_, photons);
+}
+
+// Whether the kernel can tell where virtual objects do not change the light of a catcher.
+bool Renderer::finds_unchanged() const {
+    constexpr std::uint32_t most_lamps = 64; // the time is proportional to their number
+    return scene_.view().light_count <= most_lamps &&
+           std::ranges::none_of(lights_->emitters(), [](const auto &emitter) { return emitter.density > 0; });
 }
 
 PathScene Renderer::path_scene() const {
     PathScene path{};
+    path.wide_catcher = -1;
     if (!lights_)
         return path;
     path.sources = lights_->records().data();
@@ -270,6 +258,7 @@ PathScene Renderer::path_scene() const {
     path.max_radiance = max_radiance_;
     path.least_irradiance = lights_->least_irradiance(has_video_ ? &video_ : nullptr);
     const arhost_intrinsics &of = full_intrinsics_;
+    path.brightest_texel = brightest_texel_;
     path.video.image = {has_video_ ? video_.texels() : nullptr,
                         static_cast<std::int32_t>(of.width),
                         static_cast<std::int32_t>(of.height),
@@ -305,10 +294,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     scene_.set_environment_scale(
         arhost::raytracer_common::environment_scale(scene_.arena().environment, has_video_ ? &video_ : nullptr));
 
-    std::vector<Window> windows;
-    for (const Box &box : scene_.visible_boxes())
-        windows.push_back(window_of(box, pose));
-
+    const ObjectWindows windows(scene_, pose, ray_table_.rays().dimensions == 2);
     const std::vector<Tile> &tiles = ray_table_.tiles();
     if (!history_.empty()) {
         if (motion || !history_camera_ || !same_view(*history_camera_, camera))
@@ -347,9 +333,11 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
     if (denoiser_ && state.after)
-        frame.denoising = &denoiser_->begin(state, intrinsics_, frame.camera, scene_.placed_objects(),
-                                            motion && motion->deformed_count > 0,
-                                            static_cast<std::uint32_t>(sequence), full_samples_);
+        frame.denoising = &denoiser_->begin(
+            state, intrinsics_, frame.camera, scene_.placed_objects(), motion && motion->deformed_count > 0,
+            static_cast<std::uint32_t>(sequence), full_samples_, windows.wide_catcher());
+    if (frame.denoising && finds_unchanged())
+        frame.path.wide_catcher = windows.wide_catcher();
     if (lights_)
         trace_photons(frame);
     const RenderTile render_tile = lights_ ? kernel_.render_path_tile : kernel_.render_tile;
@@ -357,12 +345,12 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     std::mutex drawn_mutex;
     threads_.for_each(tiles.size(), [&](std::size_t i, std::size_t thread) {
         const Tile &tile = tiles[i];
-        const bool visible = std::any_of(windows.begin(), windows.end(), [&](const Window &window) {
-            return ray_table_.window(i).intersects(window);
-        });
-        if (!visible || host_.cancelled())
+        const Window &window = ray_table_.window(i);
+        if (!windows.may_affect(window) || host_.cancelled())
             return frame.denoising ? denoiser_->clear(tile) : clear(image, tile.pixels);
-        const Rectangle part = render_tile(frame, tile, *scratch_[thread]);
+        Scratch &scratch = *scratch_[thread];
+        windows.select(window, scratch);
+        const Rectangle part = render_tile(frame, tile, scratch);
         progress.finish_tile();
         if (part.x0 < part.x1) {
             std::lock_guard lock(drawn_mutex);

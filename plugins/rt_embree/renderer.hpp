@@ -5,6 +5,7 @@
 
 #include "denoiser.hpp"
 #include "embree_scene.hpp"
+#include "photon_sums.hpp"
 #include "ray_table.hpp"
 #include "raytracer_common/photon_map.hpp"
 #include "raytracer_common/video.hpp"
@@ -68,6 +69,7 @@ private:
     void set_size(const arhost_camera &camera);
     void place_lights();
     PathScene path_scene() const;
+    bool finds_unchanged() const;
     void trace_photons(Frame &frame);
 
     arhost::Host host_;
@@ -87,13 +89,16 @@ private:
     std::optional<arhost::raytracer_common::LightSources> lights_;
     std::array<float, arhost::raytracer_common::source_rows * most_few_sources> few_sources_{}; // of PathScene
     std::vector<float> irradiance_;                                                             // of the environment
+    float brightest_texel_ = 0;                                                                 // of PathScene
     float max_radiance_;
     bool blends_codes_;          // as in Frame
     std::uint32_t full_samples_; // the random numbers of a frame begin at its number times this
     std::uint32_t photons_per_sample_;
     arhost::raytracer_common::PhotonTargets photon_targets_;
     std::vector<arhost::raytracer_common::Photon> photons_;
+    std::vector<std::int8_t> photon_faces_; // see TracePhotons
     arhost::raytracer_common::PhotonMap photon_map_;
+    PhotonSums photon_sums_;
     arhost::raytracer_common::VideoImage video_;
     bool has_video_ = false; // of the current frame
     float max_radius_squared_;

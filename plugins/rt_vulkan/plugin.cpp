@@ -69,7 +69,8 @@ public:
         : host_(host), instance_(host, options.boolean("validate")),
           physical_(chosen_device(instance_, options.text("device"), host_)),
           paths_(choose_paths(physical_, options.text("path"))) {
-        settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
+        quality_ = options.text("quality");
+        settings_.samples = samples_of(options);
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
         settings_.single_path = options.text("glass") == "path";
@@ -107,7 +108,7 @@ public:
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};
     void set(const arhost::Options &changed) {
         if (changed.contains("samples"))
-            settings_.samples = static_cast<std::uint32_t>(changed.integer("samples"));
+            settings_.samples = samples_of(changed);
         else
             renderer_->set_light_samples(static_cast<std::uint32_t>(changed.integer("light_samples")));
     }
@@ -125,6 +126,11 @@ public:
     }
 
 private:
+    std::uint32_t samples_of(const arhost::Options &options) const {
+        const auto samples = static_cast<std::uint32_t>(options.integer("samples"));
+        return samples > 0 ? samples : arhost::raytracer_common::samples_of(quality_);
+    }
+
     // Tries to start with the first of `paths_`. If that fails and trying another path makes sense, returns false;
     // otherwise throws.
     bool try_start(const arhost_raytracer_setup &setup) {
@@ -152,6 +158,7 @@ private:
     PhysicalDevice physical_;
     std::vector<Path> paths_; // paths that have not failed yet, best first
     Settings settings_;
+    std::string quality_;
     std::optional<Renderer> renderer_;
 };
 
@@ -168,7 +175,11 @@ constexpr arhost_option_descriptor options[] = {
         "How rays are traced; 'plain': software BVH traversal; 'query' and 'pipeline': hardware acceleration "
         "structures; 'auto': on a GPU the first of 'pipeline', 'query' and 'plain' that works, on a CPU 'plain'.",
         0, 0, paths),
-    arhost::option(ARHOST_OPTION_INTEGER, "samples", "1", "Primary rays per pixel, evenly spread over the pixel.", 1,
+    arhost::option(ARHOST_OPTION_TEXT, "quality", "realtime",
+                   "'realtime': 1 sample per pixel; 'balanced': 4; 'reference': 64.", 0, 0,
+                   arhost::raytracer_common::qualities),
+    arhost::option(ARHOST_OPTION_INTEGER, "samples", "0",
+                   "Primary rays per pixel, evenly spread over the pixel; 0: as many as 'quality' says.", 0,
                    max_samples),
     arhost::option(ARHOST_OPTION_INTEGER, "light_samples", "4",
                    "Shadow rays from each shaded point to each area light and to the environment.", 1, 256),

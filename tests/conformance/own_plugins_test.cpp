@@ -55,7 +55,7 @@ const auto name_of = [](const auto &info) { return info.param.name; };
 INSTANTIATE_TEST_SUITE_P(
     All, OwnPlugins,
     testing::Values(OwnPlugin{"ArUco", "tracker_aruco", {}}, OwnPlugin{"Patterns", "tracker_pattern", {}},
-                    OwnPlugin{"Vulkan", "rt_vulkan", {}}, OwnPlugin{"Denoising", "rt_embree", {"denoise=true"}},
+                    OwnPlugin{"Vulkan", "rt_vulkan", {}}, OwnPlugin{"Reference", "rt_embree", {"quality=reference"}},
                     OwnPlugin{"DefaultPictures", "source_file", {}},
                     OwnPlugin{"Synthetic", "source_synthetic", {"width=160", "height=120", "frames=60"}},
                     OwnPlugin{"FilePictures", "source_file", {"path=in/%02d.png"}},

@@ -85,7 +85,7 @@ TEST(Live, ShownFramesEqualThoseOfLockstep) {
         "80}]}\n"
         "raytracer: {plugin: rt_embree, scene: " +
         arhost::test::source_directory() +
-        "/config/scenes/demo.yaml, options: {samples: 64}, deadline_ms: 60000}\n"
+        "/tests/plugins/rt_embree/golden/desk.yaml, options: {samples: 64}, deadline_ms: 60000}\n"
         "outputs: [{plugin: sink_images, path: \"%04d.png\"}]\nlive: {max_latency_ms: 60000}\nstats: stats.json\n";
     ArhostRun live(yaml), lockstep(yaml);
     ASSERT_EQ(live.run({"--config", "run.yaml", "--set", "mode=live"}), 0) << live.output();

@@ -16,7 +16,9 @@ constexpr const char *source =
     "width: 160, height: 120}}\n";
 constexpr const char *tracker =
     "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n";
-constexpr const char *raytracer = "raytracer: {plugin: rt_embree, scene: scene.yaml}\n";
+// Images do not depend on earlier ones.
+constexpr const char *raytracer =
+    "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {quality: reference, samples: 1}}\n";
 
 // A sphere of a colour, or an object of a mesh file.
 std::string scene_with(const std::string &object) {

@@ -41,13 +41,18 @@ constexpr arhost_host host = {sizeof(arhost_host),
                               [](const arhost_host *) { return 0; },
                               [](const arhost_host *, const char *) -> const void * { return nullptr; }};
 
-// Sets the option `samples` to 16 if it is not set and the plugin supports this value. Plugins default to 1, but here
-// quality matters more than speed.
-void prefer_samples(yaml::Node &options, const model::PluginDescription &plugin) {
-    for (const model::OptionDeclaration &o : plugin.options)
-        if (o.key == "samples" && o.type == ARHOST_OPTION_INTEGER && !options.find("samples") &&
+// Sets the options `samples` to 16 and `quality` to reference if they are not set and the plugin supports these
+// values. Plugins default to the frame rate, but here quality matters more than speed.
+void prefer_quality(yaml::Node &options, const model::PluginDescription &plugin) {
+    for (const model::OptionDeclaration &o : plugin.options) {
+        if (options.find(o.key))
+            continue;
+        if (o.key == "samples" && o.type == ARHOST_OPTION_INTEGER &&
             ((o.minimum == 0 && o.maximum == 0) || (o.minimum <= 16 && o.maximum >= 16)))
             options.override_value("samples", "16");
+        if (o.key == "quality" && std::ranges::find(o.choices, "reference") != o.choices.end())
+            options.override_value("quality", "reference");
+    }
 }
 
 // Image memory that is page-aligned, as arhost/raytracer.h requires.
@@ -79,7 +84,7 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
     model::check(plugin);
     if (plugin.kind != ARHOST_KIND_RAYTRACER)
         requested.fail("'" + plugin.short_name() + "' is a " + model::to_text(plugin.kind) + ", not a ray tracer");
-    prefer_samples(options, plugin);
+    prefer_quality(options, plugin);
     std::vector<std::string> notes;
     const std::vector<model::OptionValue> values =
         run_config::resolve_options(plugin, options, std::nullopt, requested, notes);

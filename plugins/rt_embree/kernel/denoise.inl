@@ -31,6 +31,11 @@ ARHOST_INLINE Int surfaces_at(const Denoising &denoising, std::ptrdiff_t at) {
     return bits_of(load(denoising.guides[surface_guide] + at));
 }
 
+// Returns the lanes whose surfaces have guides and light.
+ARHOST_INLINE Bool is_shaded(Int surface) {
+    return (surface != Int(0)) & (surface != Int(unchanged_surface));
+}
+
 // Normals with 10 bits per component.
 ARHOST_INLINE Int packed_normal(Vec3 n) {
     const auto bits = [](Float a) __attribute__((always_inline)) {
@@ -48,6 +53,14 @@ ARHOST_INLINE Vec3 unpacked_normal(Int a) {
 // Values of variance_light of light[0]: whether the light of a pixel was sampled in this frame. A pixel of a catcher
 // that was not has the light of the pixel of its 2×2 that was, if both show the same surface, else 0.
 constexpr float not_sampled = 0, borrowed = 0.5f, sampled = 1;
+
+// Marks the pixels of a block as unchanged.
+ARHOST_INLINE void write_unchanged(const Frame &frame, int x, int y, int width, int height) {
+    const Denoising &denoising = *frame.denoising;
+    const int values[block] = {unchanged_surface, unchanged_surface, unchanged_surface, unchanged_surface};
+    for (int row = 0; row < height; ++row)
+        __builtin_memcpy(denoising.guides[surface_guide] + guide_at(denoising, x, y + row), values, 4 * width);
+}
 
 // Writes the guides and the light of a block. `count`: the number of samples.
 ARHOST_INLINE void write_for_denoiser(const Frame &frame, const Scratch &scratch, int first_pixel,
@@ -179,15 +192,17 @@ ARHOST_INLINE Float limit_by_neighbours(const Denoising &denoising, std::ptrdiff
             brightest = max(brightest, select(same, luminance(load3(denoising.light[0], there)), Float(0.0f)));
             count = count + select(same, Float(1.0f), Float(0.0f));
         }
-    return select(count < Float(3.0f), Float(far_away), brightest * Float(1.5f) + Float(0.02f));
+    return select(count < Float(3.0f), Float(far_away), brightest * Float(4.0f) + Float(0.02f));
 }
 
 // Returns the light of a row's pixels without fireflies: single paths that find a small bright light would remain
 // visible for many frames.
 ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, std::ptrdiff_t at, int row, Int surface) {
-    Float limit = limit_by_neighbours(denoising, at, row, surface, 1);
-    const Bool borrows = is_kind(surface, real_surface);
-    if (denoising.catcher_phase >= 0 && any(borrows)) // nearer pixels may have the same light
+    const Bool borrows = is_kind(surface, real_surface) & bool_of(denoising.catcher_phase >= 0);
+    Float limit(far_away);
+    if (any(~borrows))
+        limit = limit_by_neighbours(denoising, at, row, surface, 1);
+    if (any(borrows)) // nearer pixels may have the same light
         limit = select(borrows, limit_by_neighbours(denoising, at, row, surface, 2), limit);
     const Vec3 light = load3(denoising.light[0], at);
     const Float value = luminance(light);
@@ -203,12 +218,10 @@ ARHOST_INLINE void accumulate(const Frame &frame, std::int32_t row) {
     for (std::int32_t x = 0; x < denoising.width; x += lanes) {
         const std::ptrdiff_t at = guide_at(denoising, x, row), kept = history_at(denoising, x, row);
         const Int surface = surfaces_at(denoising, at);
-        const Bool active = surface != Int(0);
+        const Bool active = is_shaded(surface);
         if (!any(active)) {
             for (float *to : denoising.after)
                 store(to + kept, Float(0.0f));
-            for (float *to : denoising.light[1])
-                store(to + at, Float(0.0f));
             continue;
         }
         const float *const *guides = denoising.guides;
@@ -244,7 +257,7 @@ ARHOST_INLINE void accumulate(const Frame &frame, std::int32_t row) {
         store(denoising.after[distance_history] + kept,
               select(active, length(position - splat(frame.camera.eye)), Float(0.0f)));
         store(denoising.after[normal_history] + kept, float_of(select(active, packed_normal(normal), Int(0))));
-        store(denoising.after[surface_history] + kept, float_of(surface));
+        store(denoising.after[surface_history] + kept, float_of(select(active, surface, Int(0))));
         store(denoising.after[frames_history] + kept, frames);
         store3(denoising.light[1], at, select(active, mean, black()));
         store(denoising.light[1][variance_light] + at, select(active, variance, Float(0.0f)));
@@ -287,11 +300,9 @@ ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
     for (std::int32_t x = 0; x < denoising.width; x += lanes) {
         const std::ptrdiff_t at = guide_at(denoising, x, row);
         const Int surface = surfaces_at(denoising, at);
-        if (!any(surface != Int(0))) {
-            for (int i = 0; i < light_rows; ++i)
-                store(to[i] + at, Float(0.0f));
+        if (!any(is_shaded(surface)))
             continue;
-        }
+        const bool flat = !any(surface != Int(denoising.flat_surface)); // needs no test of positions and normals
         const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
         const Vec3 light = load3(from, at);
         const Float own = luminance(light);
@@ -306,6 +317,16 @@ ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
                                select(is_kind(surface, specular_surface), Float(8.0f), Float(1.0f));
         const Float inverse_tolerance =
             Float(1.0f) / (distance * Float(2.0f * static_cast<float>(step) * denoising.pixel_angle) + Float(1e-6f));
+        // Guides do not have all edges of the picture in curved mirrors and glass.
+        const Float tolerated = select(is_kind(surface, specular_surface), Float(9.0f), Float(36.0f));
+        // The jittered samples of a moving mirror are too few to smooth what it shows.
+        const Bool specular = is_kind(surface, specular_surface) & bool_of(denoising.camera_moved);
+        const bool any_specular = any(specular);
+        Vec3 inverse_albedo = white();
+        if (any_specular) {
+            const Vec3 albedo = select(specular, load3(guides + albedo_guide, at), white());
+            inverse_albedo = {Float(1.0f) / albedo.x, Float(1.0f) / albedo.y, Float(1.0f) / albedo.z};
+        }
         const Float own_weight = select(has_light, Float(0.25f), Float(0.0f)), least = max(variance, Float(0.0f));
         Vec3 sum = light * own_weight;
         Float total = own_weight, squares = least * own_weight * own_weight;
@@ -317,27 +338,38 @@ ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
                     continue;
                 const std::ptrdiff_t there = at + dy * step * down + dx * step;
                 const Float of_other = load(from[variance_light] + there);
-                const Bool same = (surfaces_at(denoising, there) == surface) & (of_other > Float(no_light));
+                const Int surface_there = surfaces_at(denoising, there);
+                Bool same = surface_there == surface, in_mirror = bool_of(false);
+                if (pass == 0 && any_specular) {
+                    in_mirror = specular & (((surface_there ^ surface) & Int(mirrored_unit - 1)) == Int(0));
+                    same = same | in_mirror;
+                }
+                same = same & (of_other > Float(no_light));
                 if (!any(same))
                     continue;
-                const Vec3 other = load3(from, there);
-                const Float facing = max(dot(load3(guides + normal_guide, there), normal), Float(0.0f));
-                const Float apart = abs(dot(load3(guides + position_guide, there) - position, normal));
+                Vec3 other = load3(from, there);
+                if (pass == 0 && any_specular)
+                    other = select(in_mirror, other * load3(guides + albedo_guide, there) * inverse_albedo, other);
                 const Float difference = luminance(other) - own;
                 const Float spread = least + max(of_other, least) + Float(least_variance);
                 const auto falling = [](Float a) __attribute__((always_inline)) {
                     const Float rest = max(Float(1.0f) - a, Float(0.0f));
                     return rest * rest;
                 };
-                Float alike = facing * facing;
-                alike = alike * alike;
-                alike = alike * alike;
-                alike = alike * alike; // cos^16
                 const Float kernel((dx == 0 ? 2.0f : 1.0f) * (dy == 0 ? 2.0f : 1.0f) / 16);
-                const Float plausible =
-                    select(has_light, falling(difference * difference / (spread * Float(9.0f))), Float(1.0f));
-                const Float weight =
-                    select(same, kernel * alike * falling(apart * inverse_tolerance) * plausible, Float(0.0f));
+                Float weight = kernel;
+                if (!flat) {
+                    const Float facing = max(dot(load3(guides + normal_guide, there), normal), Float(0.0f));
+                    Float alike = facing * facing;
+                    alike = alike * alike;
+                    alike = alike * alike;
+                    alike = alike * alike; // cos^16
+                    const Float apart = abs(dot(load3(guides + position_guide, there) - position, normal));
+                    weight = weight * alike * falling(apart * inverse_tolerance);
+                }
+                const Float plausible = falling(difference * difference / (spread * tolerated));
+                weight = select(same, select(in_mirror, kernel, weight * select(has_light, plausible, Float(1.0f))),
+                                Float(0.0f));
                 sum = sum + other * weight;
                 squares = squares + weight * weight * max(of_other, least);
                 total = total + weight;
@@ -360,7 +392,19 @@ ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
     const Denoising &denoising = *frame.denoising;
     const float *const *guides = denoising.guides;
     const std::ptrdiff_t at = guide_at(denoising, x, y), down = denoising.guide_stride();
-    const Int surface = surfaces_at(denoising, at);
+    const auto flat_if_unchanged = [&](Int surface) __attribute__((always_inline)) {
+        return select(surface == Int(unchanged_surface), Int(denoising.flat_surface), surface);
+    };
+    const Int surface = flat_if_unchanged(surfaces_at(denoising, at));
+    Bool differs = surface != Int(denoising.flat_surface);
+    if (!any(differs)) {
+        for (int dy = -1; dy <= 1; ++dy)
+            for (int dx = -1; dx <= 1; ++dx)
+                if ((dx == 0) != (dy == 0) && y + dy >= 0 && y + dy < denoising.height)
+                    differs = differs | (flat_if_unchanged(surfaces_at(denoising, at + dy * down + dx)) != surface);
+        if (!any(differs))
+            return differs;
+    }
     const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
     const Float tolerance = length(position - splat(frame.camera.eye)) * Float(3 * denoising.pixel_angle);
     Bool edge = bool_of(false);
@@ -369,10 +413,11 @@ ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
         if (y + dy < 0 || y + dy >= denoising.height)
             continue;
         const std::ptrdiff_t there = at + dy * down + dx;
-        const Int other = surfaces_at(denoising, there);
+        const Int other = flat_if_unchanged(surfaces_at(denoising, there));
         const Bool inside = Int(-1) < (lane_numbers() + Int(x + dx));
         const Bool right = (lane_numbers() + Int(x + dx)) < Int(denoising.width);
         const Bool folded = (other != Int(0)) & ~is_kind(surface, specular_surface) &
+                            (surface != Int(denoising.flat_surface)) &
                             ((dot(load3(guides + normal_guide, there), normal) < Float(0.8f)) |
                              (abs(dot(load3(guides + position_guide, there) - position, normal)) > tolerance));
         edge = edge | (inside & right & ((((other ^ surface) & Int(mirrored_unit - 1)) != Int(0)) | folded));
@@ -412,8 +457,8 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
             const float dx = (static_cast<float>(columns[i]) + 0.5f) / tap_count - 0.5f,
                         dy = (static_cast<float>(i) + 0.5f) / tap_count - 0.5f;
             const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), dx, dy);
-            const PrimaryHits hits =
-                trace_primary(frame.scene, splat(frame.camera.eye), direction, edges & (direction.x == direction.x));
+            const Bool has_ray = edges & (direction.x == direction.x);
+            const PrimaryHits hits = trace_primary(frame.scene, splat(frame.camera.eye), direction, has_ray, has_ray);
             Int surface(0);
             Float far(0.0f);
             if (any(hits.is_virtual)) {
@@ -432,13 +477,14 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
                 const Bool inside = edges & (Int(-1) < tap_y) & (tap_y < Int(denoising.height));
                 const Int at = select(inside, tap_y * Int(denoising.guide_stride()) + tap_x + Int(Denoising::margin),
                                       Int(Denoising::margin));
-                const Int there = bits_of(gather(guides[surface_guide], at)) & Int(mirrored_unit - 1);
-                const Bool same = inside & (there == surface) & (surface != Int(0));
+                const Int number = bits_of(gather(guides[surface_guide], at)) & Int(mirrored_unit - 1);
+                const Bool flat = (number == Int(unchanged_surface)) & (surface == Int(denoising.flat_surface));
+                const Bool same = inside & (flat | (number == surface)) & (surface != Int(0));
                 if (!any(same))
                     continue;
                 const Vec3 away = gather3(guides + position_guide, at) - position;
                 const Float from_plane = abs(dot(gather3(guides + normal_guide, at), away));
-                const Float apart = select(is_kind(surface, specular_surface), Float(0.0f), from_plane) +
+                const Float apart = select(flat | is_kind(surface, specular_surface), Float(0.0f), from_plane) +
                                     Float(tap == own_tap ? 0.0f : 1e-3f) * far;
                 const Bool nearer = same & (apart < least);
                 least = select(nearer, apart, least);
@@ -454,6 +500,24 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
                 static_cast<unsigned>(values[lane]);
         }
     });
+}
+
+// Writes pixels of a row that virtual objects do not affect.
+ARHOST_INLINE void write_untouched(const Frame &frame, int x, int row, int width) {
+    if (!frame.linear) {
+        __builtin_memset(frame.rgba + std::size_t{frame.stride} * row + std::size_t{4} * x, 0, 4 * width);
+        return;
+    }
+    constexpr std::uint16_t one = 0x3c00;
+    alignas(64) static constexpr std::uint16_t four[32] = {0,   0,   0,   0,   one, one, one, 0,   0,   0,   0,
+                                                           0,   one, one, one, 0,   0,   0,   0,   0,   one, one,
+                                                           one, 0,   0,   0,   0,   0,   one, one, one, 0};
+    auto *to = reinterpret_cast<std::uint8_t *>(frame.linear) + std::size_t{frame.stride} * row + std::size_t{16} * x;
+    for (int column = 0; column < width; column += 4, to += sizeof four)
+        if (width - column >= 4)
+            __builtin_memcpy(to, four, sizeof four);
+        else
+            __builtin_memcpy(to, four, 16 * (width - column));
 }
 
 // Writes a row of the image. `passes`: of the filter.
@@ -472,10 +536,14 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row, int passes
             linear.added = linear.added + select(is_virtual, light * albedo * share, black());
             linear.transmittance =
                 linear.transmittance +
-                select(here & ~is_virtual, (white() + select(surface != Int(0), light, black())) * share, black());
+                select(here & ~is_virtual, (white() + select(is_shaded(surface), light, black())) * share, black());
         };
         const std::ptrdiff_t at = guide_at(denoising, x, row);
         const Bool plain = taps == Int(static_cast<int>(only_own));
+        if (!any(~plain | is_shaded(surfaces_at(denoising, at)))) {
+            write_untouched(frame, x, row, width);
+            continue;
+        }
         add(surfaces_at(denoising, at), load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
         const Bool edges = ~plain & (lane_numbers() < Int(width));
         if (any(edges)) {

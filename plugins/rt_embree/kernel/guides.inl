@@ -4,17 +4,9 @@
 #pragma once
 #include "path_catcher.inl"
 
-// Kinds of surfaces.
-enum SurfaceKind : int {
-    scattering_surface,
-    specular_surface, // mirrors and glass
-    real_surface,
-    glossy_surface
-};
-
-// Returns the numbers of the surfaces hit: 4 · (index of the object + 1) + kind. Where a specular surface shows
-// another one, store_seen() adds mirrored_unit · (index of the latter + 1).
-constexpr int mirrored_unit = 1 << 20;
+// Returns the numbers of the surfaces hit (surface_number()). Where a specular surface shows another one,
+// store_seen() adds mirrored_unit · (index of the latter + 1).
+constexpr int mirrored_unit = most_surfaces;
 ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool active) {
     Int kinds(0);
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {

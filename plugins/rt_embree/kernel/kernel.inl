@@ -12,9 +12,9 @@ namespace {
 #include "primary.inl"
 
 // Traces the primary rays of a block and shades their hits. Returns whether any of the pixels can have radiance.
-ARHOST_INLINE bool trace_primary_and_shade(Work &work, int first_pixel, Vec3 direction, Bool active) {
+ARHOST_INLINE bool trace_primary_and_shade(Work &work, int first_pixel, Vec3 direction, Bool active, Bool near) {
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
-    const PrimaryHits hits = trace_primary(work.frame.scene, splat(work.frame.camera.eye), direction, active);
+    const PrimaryHits hits = trace_primary(work.frame.scene, splat(work.frame.camera.eye), direction, active, near);
     if (any(hits.caught)) {
         const CatcherLight light = catcher_light(work.frame, hits.catcher_rays, hits.caught, random_of(work, paths));
         const Vec3 hidden = select(hits.caught, light.hidden, black());
@@ -38,14 +38,17 @@ ARHOST_INLINE Vec3 load_rays(const float *arrays, std::int32_t dimensions, float
     return {load(arrays), load(arrays + lanes), dimensions == 3 ? load(arrays + 2 * lanes) : Float(z)};
 }
 
-// Returns the ray directions of a block, in world axes, through points that are (x, y) px from the pixels' centres.
-ARHOST_INLINE Vec3 direction_in_world(const Frame &frame, const float *rays, float x, float y) {
+// Returns the ray directions of a block, in camera axes, through points that are (x, y) px from the pixels' centres.
+ARHOST_INLINE Vec3 direction_in_camera(const Frame &frame, const float *rays, float x, float y) {
     const std::int32_t dimensions = frame.rays.dimensions, step = lanes * dimensions;
     Vec3 direction = load_rays(rays, dimensions, 1);
     if (frame.rays.has_derivatives)
         direction = direction + load_rays(rays + step, dimensions, 0) * Float(x) +
                     load_rays(rays + 2 * step, dimensions, 0) * Float(y);
-    return transform(frame.camera.world_from_camera, direction);
+    return direction;
+}
+ARHOST_INLINE Vec3 direction_in_world(const Frame &frame, const float *rays, float x, float y) {
+    return transform(frame.camera.world_from_camera, direction_in_camera(frame, rays, x, y));
 }
 
 ARHOST_INLINE Int srgb8(const arhost::shading::Srgb8Table &table, Float linear) {
@@ -166,11 +169,13 @@ template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use
 }
 
 #include "denoise.inl"
+#include "region.inl"
 
 struct Whitted {
     template <class DirectionAt>
-    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, DirectionAt, Bool active) {
-        return trace_primary_and_shade(work, first_pixel, direction, active);
+    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, DirectionAt, Bool active,
+                                      Bool near) {
+        return trace_primary_and_shade(work, first_pixel, direction, active, near);
     }
     static ARHOST_INLINE void finish_primary(Work &) {}
     static ARHOST_INLINE void trace_packet(Work &work, std::uint32_t depth) { trace_queued_packet(work, depth); }
@@ -188,8 +193,8 @@ struct Whitted {
 struct Path {
     template <class DirectionAt>
     static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, DirectionAt direction_at,
-                                      Bool active) {
-        return primary_path(work, first_pixel, direction, direction_at, active);
+                                      Bool active, Bool near) {
+        return primary_path(work, first_pixel, direction, direction_at, active, near);
     }
     static ARHOST_INLINE void finish_primary(Work &work) {
         if (work.scratch.deferred.count > 0)
@@ -223,7 +228,12 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     Work work{frame, scratch,
               0,     (static_cast<std::uint32_t>(all.x0) * 65536u + static_cast<std::uint32_t>(all.y0)) ^ 0x51ed270bu,
               0,     0};
-    bool has_light[tile_pixels / lanes];
+    bool has_light[tile_pixels / lanes], unchanged[tile_pixels / lanes] = {};
+    if (frame.path.wide_catcher >= 0 && find_unchanged(frame, tile, scratch, unchanged)) {
+        for_each_block(
+            all, [&](int, int x, int y, int width, int height) { write_unchanged(frame, x, y, width, height); });
+        return drawn;
+    }
     for (int i = 0; i < frame.scene.sum_row_count(); ++i)
         __builtin_memset(scratch.sum[i], 0, tile_pixels * sizeof(float));
     if (frame.denoising)
@@ -238,11 +248,17 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
             const auto direction_at = [&](float x, float y) __attribute__((always_inline)) {
                 return direction_in_world(frame, block_rays, x, y);
             };
-            const Vec3 direction =
-                frame.denoising ? direction_at(0, 0) : direction_at(frame.samples[i].x, frame.samples[i].y);
+            has_light[number] = false;
+            if (unchanged[number])
+                return;
+            const Vec3 in_camera =
+                frame.denoising ? direction_in_camera(frame, block_rays, 0, 0)
+                                : direction_in_camera(frame, block_rays, frame.samples[i].x, frame.samples[i].y);
+            const Vec3 direction = transform(frame.camera.world_from_camera, in_camera);
             const Bool inside =
                 inside_block(width, height) & (direction.x == direction.x); // false if NaN: the pixel has no ray
-            has_light[number] = Integrator::primary(work, number * lanes, direction, direction_at, inside);
+            has_light[number] = Integrator::primary(work, number * lanes, direction, direction_at, inside,
+                                                    in_windows(scratch.virtual_windows, in_camera, inside));
         });
         Integrator::finish_primary(work);
         trace_queued_rays(work, [](Work &of, std::uint32_t depth) { Integrator::trace_packet(of, depth); });
@@ -256,6 +272,8 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     const std::uint32_t count = frame.first_sample + static_cast<std::uint32_t>(frame.sample_count);
     for_each_block(all, [&](int number, int x, int y, int width, int height) {
         const int first_pixel = number * lanes;
+        if (unchanged[number])
+            return write_unchanged(frame, x, y, width, height);
         if (frame.history[0])
             add_history(frame, scratch, tile.first_block * lanes, first_pixel);
         if (Integrator::write(frame, scratch, first_pixel, count, x, y, width, height)) {
@@ -278,10 +296,10 @@ Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratc
     return render<Path>(frame, tile, scratch);
 }
 
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
-                   arhost::raytracer_common::Photon *to) {
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
+                   std::int8_t *faces) {
     for (std::uint32_t i = 0; i < count; i += lanes)
-        trace_photon_packet(frame, first + i, to + i, lane_numbers() < Int(static_cast<int>(count - i)));
+        trace_photon_packet(frame, first + i, to + i, faces + i, lane_numbers() < Int(static_cast<int>(count - i)));
 }
 
 void accumulate_row(const Frame &frame, std::int32_t row, int) {

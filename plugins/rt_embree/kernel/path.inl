@@ -95,12 +95,19 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
                 Float(1.0f) / max(density, Float(1e-30f)));
 }
 
+// The denoiser leaves bright single paths visible for many frames. So surfaces have wider highlights where another
+// surface, but a mirror or glass, scatters their light (A. Kaplanyan and C. Dachsbacher, Path Space Regularization
+// for Holistic and Robust Light Transport, Eurographics 2013).
+constexpr float least_scattered_alpha = 0.3f;
+
 // Adds the light that the hit surfaces send towards the rays' origins, and queues the rays that they scatter.
 ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool &hit, const Paths &from) {
     const Scene &scene = work.frame.scene;
     Bool active = hit;
     Paths paths = from;
-    const Surface s = surface_at(scene, rays, active);
+    Surface s = surface_at(scene, rays, active);
+    if (work.frame.denoising && s.any_rough)
+        s.alpha = select(paths.inverse_density == Float(0.0f), s.alpha, max(s.alpha, Float(least_scattered_alpha)));
     const Vec3 direction = normalize(direction_of(rays.ray));
     if (paths.depth > 0)
         active = active & ~(s.is_real & sees_only_virtual(paths));
@@ -184,11 +191,13 @@ ARHOST_INLINE void sample_deferred_catchers(Work &work) {
         const auto row = [&](int i) __attribute__((always_inline)) {
             return load(deferred.values[i] + first);
         };
-        const PrimaryHits hits =
-            trace_primary(work.frame.scene, splat(work.frame.camera.eye), {row(0), row(1), row(2)}, active);
+        RTCRayHit16 rays;
+        set_ray(rays.ray, splat(work.frame.camera.eye), {row(0), row(1), row(2)}, Float(far_away), Int(catcher_mask));
+        const Bool caught =
+            trace(work.frame.scene, work.frame.scene.catchers, make_query(Coherence::coherent, true), rays, active);
         const Paths paths{select(active, bits_of(row(3)), Int(0)), -1, white(), 0, Float(0.0f)};
-        if (any(hits.caught))
-            change_catcher(work, in_plane(paths, change_plane), hits.catcher_rays, hits.caught);
+        if (any(caught))
+            change_catcher(work, in_plane(paths, change_plane), rays, caught);
     }
     deferred.count = 0;
     work.sample = sample;
@@ -201,7 +210,8 @@ ARHOST_INLINE void shade_specular(Work &work, const PrimaryHits &centre, const P
                                   Bool active) {
     const Scene &scene = work.frame.scene;
     const arhost::raytracer_common::Sample &at = work.frame.samples[work.index];
-    const PrimaryHits near = trace_primary(scene, splat(work.frame.camera.eye), direction_at(at.x, at.y), active);
+    const PrimaryHits near =
+        trace_primary(scene, splat(work.frame.camera.eye), direction_at(at.x, at.y), active, active);
     const Bool same =
         near.is_virtual & (object_number(scene, near.rays.hit) == object_number(scene, centre.rays.hit));
     if (any(same))
@@ -211,16 +221,17 @@ ARHOST_INLINE void shade_specular(Work &work, const PrimaryHits &centre, const P
 }
 
 // Traces the primary rays of a block and shades their hits. Returns whether any pixel can be affected.
-// `direction_at`: (x, y) px from the pixels' centres.
+// `direction_at`: (x, y) px from the pixels' centres; `near`: see trace_primary().
 template <class DirectionAt>
-ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, DirectionAt direction_at, Bool active) {
+ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, DirectionAt direction_at, Bool active,
+                                Bool near) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
     const int planes_used = scene.has_gloss ? plane_count : mirrored_plane;
     for (float *planes : work.scratch.radiance)
         for (int plane = 0; plane < planes_used; ++plane)
             store(planes + plane * tile_pixels + first_pixel, Float(0.0f));
-    const PrimaryHits hits = trace_primary(scene, eye, direction, active);
+    const PrimaryHits hits = trace_primary(scene, eye, direction, active, near);
     if (work.frame.denoising && work.index == 0)
         store_guides(work, hits, direction, first_pixel);
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};

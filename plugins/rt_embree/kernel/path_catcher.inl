@@ -79,10 +79,13 @@ ARHOST_INLINE Float virtual_density(const PathScene &path, const Surface &s, Vec
     return density / max(total, Float(1e-20f));
 }
 
-// Chance of a ray from a catcher towards the virtual objects, from the sum of their form factors. There is none where
-// this sum is below 1/512, so that objects do not affect the whole desk.
+// Objects whose form factors have a smaller sum reflect no light to a catcher, so that they do not affect the whole
+// desk.
+constexpr float least_form_factor = 1.0f / 256;
+
+// Chance of a ray from a catcher towards the virtual objects, from the sum of their form factors.
 ARHOST_INLINE Float bounce_chance(Float form_factors) {
-    return select(form_factors < Float(1.0f / 512), Float(0.0f),
+    return select(form_factors < Float(least_form_factor), Float(0.0f),
                   min(max(form_factors * Float(3.0f), Float(0.02f)), Float(1.0f)));
 }
 

@@ -5,7 +5,12 @@
 #pragma once
 #include "path_lights.inl"
 
-using arhost::raytracer_common::Photon;
+using arhost::raytracer_common::Photon, arhost::raytracer_common::PhotonMap;
+
+// As PhotonGrid::hash of raytracer_common.
+ARHOST_INLINE Int photon_hash(Int x, Int y, Int z) {
+    return (x * Int(73856093)) ^ (y * Int(19349663)) ^ (z * Int(83492791));
+}
 
 enum PhotonDimension : int {
     target_dimension = 128,
@@ -109,14 +114,26 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
             (field(falloff_row) < Float(0.5f)) & ~directional};
 }
 
+// See TracePhotons.
+ARHOST_INLINE Int face_of(Vec3 normal) {
+    const Float x = abs(normal.x), y = abs(normal.y), z = abs(normal.z);
+    const auto side = [](Float a, int axis) __attribute__((always_inline)) {
+        return select(a > Float(0.0f), Int(2 * axis + 1), Int(2 * axis));
+    };
+    const Int across = select(x > y, side(normal.x, 0), side(normal.y, 1));
+    return select((z >= x) & (z >= y), side(normal.z, 2), across);
+}
+
 // Follows photons through mirrors and glass. Returns those that then arrive at another surface.
-ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, Photon *to, Bool active) {
+ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, Photon *to, std::int8_t *faces,
+                                       Bool active) {
     const Scene &scene = frame.scene;
     const Int number = lane_numbers() + Int(static_cast<int>(first + frame.path.caustics.first_number));
     const EmittedPhotons emitted = emit_photons(frame, number, active);
     Vec3 origin = emitted.origin, direction = emitted.direction, power = emitted.power;
     Bool flying = emitted.active, arrived = bool_of(false);
     Vec3 position = black(), arriving = black();
+    Int face(virtual_face);
     Float travelled(0.0f);
     for (std::uint32_t bounce = 0; bounce <= scene.max_depth && any(flying); ++bounce) {
         RTCRayHit16 rays;
@@ -166,6 +183,9 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
             const Bool ends = flying & ~specular & s.is_lit;
             position = select(ends, s.position, position);
             arriving = select(ends, direction, arriving);
+            const Vec3 towards_photon =
+                select(dot(s.geometric_normal, direction) > Float(0.0f), -s.geometric_normal, s.geometric_normal);
+            face = select(ends & s.is_real, face_of(towards_photon), face);
             arrived = arrived | ends;
         }
         flying = flying & specular & (largest(power) > Float(0.0f));
@@ -185,12 +205,27 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
                             power.z};
     for (int row = 0; row < 9; ++row)
         store(rows[row], values[row]);
+    alignas(64) int face_by_lane[lanes];
+    store(face_by_lane, face);
     for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
         const int i = __builtin_ctz(remaining);
         auto *numbers = reinterpret_cast<float *>(to + i);
         for (int row = 0; row < 9; ++row)
             numbers[row] = rows[row][i];
+        faces[i] = static_cast<std::int8_t>(face_by_lane[i]);
     }
+}
+
+// Returns the lanes in which the cell of the coarsest grid at a point, or one of its neighbours, may contain photons.
+ARHOST_INLINE Bool is_near_photons(const Photons &photons, Vec3 position) {
+    const Float inverse_cell(0.5f / photons.levels[0].radius);
+    const Vec3 at = (position - splat(photons.low)) * inverse_cell;
+    const auto cell = [](Float a) __attribute__((always_inline)) {
+        return to_int(floor(min(max(a, Float(-2.0f)), Float(1e9f))));
+    };
+    const Int bit = photon_hash(cell(at.x), cell(at.y), cell(at.z)) & Int(PhotonMap::near_bits - 1);
+    const Int word = gather(photons.near, shift_right_unsigned(bit, 5));
+    return ((word >> (bit & Int(31))) & Int(1)) == Int(1);
 }
 
 // The cells of a grid around surface points: two along each axis.
@@ -212,8 +247,7 @@ ARHOST_INLINE NearCells cells_near(const Photons &photons, const PhotonGrid &gri
         cell[0] = low[0] + Int(i & 1);
         cell[1] = low[1] + Int(i >> 1 & 1);
         cell[2] = low[2] + Int(i >> 2);
-        const Int bucket = ((cell[0] * Int(73856093)) ^ (cell[1] * Int(19349663)) ^ (cell[2] * Int(83492791))) &
-                           Int(grid.bucket_mask); // as PhotonGrid::hash of raytracer_common
+        const Int bucket = photon_hash(cell[0], cell[1], cell[2]) & Int(grid.bucket_mask);
         cells.first[i] = gather(grid.starts, bucket);
         cells.end[i] = gather(grid.starts + 1, bucket);
         cells.count = cells.count + cells.end[i] - cells.first[i];
@@ -230,6 +264,62 @@ constexpr float most_photons = 1024;
 struct PhotonLight {
     Vec3 light, mirrored;
 };
+
+// As photon_density(), but from the sums of the cells at random points nearby: on average over frames and
+// neighbouring pixels, there are no steps between cells.
+template <class LightOf>
+ARHOST_INLINE PhotonLight summed_photons(const Photons &photons, const Surface &s, Pair random, Bool active,
+                                         LightOf light_of) {
+    const Int face = select(s.is_real, face_of(s.geometric_normal), Int(virtual_face));
+    const float *cells = photons.cells;
+    Vec3 irradiance = black(), to_light = s.geometric_normal;
+    // A cell with more photons is replaced by smaller ones. A random limit hides where their size changes.
+    const Int limit = to_int(Float(4.0f) + random.u * Float(8.0f));
+    const Float third = random.u * Float(256.0f) - floor(random.u * Float(256.0f));
+    for (std::int32_t level = 0; level < photons.level_count && any(active); ++level) {
+        const float side = 2 * photons.levels[level].radius;
+        const Vec3 any_offset = Vec3{random.u - Float(0.5f), random.v - Float(0.5f), third - Float(0.5f)} * side;
+        const Vec3 offset = any_offset - s.geometric_normal * dot(any_offset, s.geometric_normal);
+        const Vec3 at = (s.position + offset - splat(photons.low)) * Float(1 / side);
+        const auto cell = [](Float a) __attribute__((always_inline)) {
+            return to_int(floor(min(max(a, Float(-2.0f)), Float(1e9f))));
+        };
+        const Int x = cell(at.x), y = cell(at.y), z = cell(at.z);
+        // As PhotonCell::key_of.
+        const Int key = x * Int(static_cast<int>(2654435761u)) + y * Int(static_cast<int>(2246822519u)) +
+                        z * Int(static_cast<int>(3266489917u)) + face;
+        Int slot = photon_hash(x, y, z) & Int(photons.cells_per_level - 1), count(0);
+        Vec3 power = black(), towards = black();
+        for (Bool searching = active; any(searching);) {
+            const Int first = (Int(level * photons.cells_per_level) + slot) * Int(PhotonCell::floats);
+            const Int here = select(searching, first, Int(0));
+            const auto vector = [&](int row) __attribute__((always_inline)) {
+                return Vec3{gather(cells + row, here), gather(cells + row + 1, here), gather(cells + row + 2, here)};
+            };
+            const Int number = bits_of(gather(cells + 6, here));
+            const Bool found = searching & (Int(0) < number) & (bits_of(gather(cells + 7, here)) == key);
+            if (any(found)) {
+                count = select(found, number, count);
+                power = select(found, vector(0), power);
+                towards = select(found, -vector(3), towards);
+            }
+            searching = searching & ~found & (Int(0) < number);
+            slot = (slot + Int(1)) & Int(photons.cells_per_level - 1);
+        }
+        // At the finest level a cell may hold all photons.
+        const Bool dense = active & (limit < count) & bool_of(level + 1 < photons.level_count);
+        const Bool here = active & ~dense & (Int(0) < count);
+        irradiance = select(here, power * Float(1 / (side * side)), irradiance);
+        to_light = select(here, towards, to_light);
+        active = dense;
+    }
+    to_light = normalize(to_light);
+    const Bool counts = (largest(irradiance) > Float(0.0f)) & (dot(to_light, s.geometric_normal) > Float(0.0f));
+    if (!any(counts))
+        return {black(), black()};
+    const PhotonLight light = light_of(irradiance, to_light);
+    return {select(counts, light.light, black()), select(counts, light.mirrored, black())};
+}
 
 // `phase`: 0 to 1, chooses which photons are read if there are too many.
 template <class LightOf>
@@ -278,6 +368,11 @@ ARHOST_INLINE PhotonLight photon_light(const Work &work, const Paths &paths, con
     PhotonLight sum{black(), black()};
     if (photons.level_count == 0)
         return sum;
+    active = active & is_near_photons(photons, s.position);
+    if (!any(active))
+        return sum;
+    if (photons.cells)
+        return summed_photons(photons, s, path_pair(work, paths, photon_dimension), active, light_of);
     const std::int32_t step = work.frame.sample_count > 8 ? 4 : 1;
     if (work.index % static_cast<std::uint32_t>(step) != 0)
         return sum;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The option `denoise`: few samples with the light of earlier frames, compared with converged pictures.
+// The option `quality`: few samples with the light of earlier frames, compared with converged pictures.
 #include "linear_tracer.hpp"
 
 #include <array>
@@ -12,7 +12,7 @@ namespace arhost::test {
 namespace {
 
 constexpr std::uint32_t width = 200, height = 150; // of pinhole()
-const Options noisy{{"samples", "1"}}, denoised{{"samples", "1"}, {"denoise", "true"}}, converged{{"samples", "256"}};
+const Options noisy{{"samples", "1"}}, denoised{{"quality", "realtime"}}, converged{{"samples", "256"}};
 
 // Objects of several materials on a table, in soft light.
 SceneBuilder still_life() {
@@ -155,9 +155,9 @@ TEST_F(Denoising, LeavesOtherPixelsUntouched) {
 
 // Frames of a run with a new worker for each frame.
 TEST_F(Denoising, ImagesDependOnTheRequestOnly) {
-    const std::array<Options, 3> variants{{{{"samples", "1"}, {"denoise", "true"}, {"threads", "1"}},
-                                           {{"samples", "1"}, {"denoise", "true"}, {"threads", "3"}},
-                                           {{"samples", "1"}, {"denoise", "true"}, {"instruction_set", "base"}}}};
+    const std::array<Options, 3> variants{{{{"quality", "realtime"}, {"threads", "1"}},
+                                           {{"quality", "realtime"}, {"threads", "3"}},
+                                           {{"quality", "realtime"}, {"instruction_set", "base"}}}};
     std::vector<std::unique_ptr<LinearTracer>> tracers;
     for (const Options &options : variants) {
         tracers.push_back(std::make_unique<LinearTracer>(still_life(), options, "rt_embree"));
@@ -182,10 +182,81 @@ TEST_F(Denoising, IgnoresAStateOfAnotherVersionOrSize) {
     }
 }
 
-TEST(DenoisingOptions, ExcludeAccumulation) {
-    PluginUnderTest plugin("rt_embree");
-    EXPECT_EQ(plugin.create({{"accumulate", "true"}, {"denoise", "true"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_NE(plugin.log().find("'accumulate' and 'denoise'"), std::string::npos) << plugin.log();
+TEST(Quality, DeterminesSamplesAndDenoising) {
+    struct Case {
+        Options options;
+        std::uint32_t samples;
+        bool denoises;
+    };
+    for (const auto &[options, samples, denoises] :
+         {Case{{{"quality", "realtime"}, {"samples", "0"}}, 1, true},
+          Case{{{"quality", "balanced"}, {"samples", "0"}}, 4, true},
+          Case{{{"quality", "reference"}, {"samples", "0"}}, 64, false},
+          Case{{{"quality", "balanced"}, {"samples", "3"}}, 3, true},
+          Case{{{"quality", "realtime"}, {"samples", "0"}, {"accumulate", "true"}}, 1, false}}) {
+        LinearTracer tracer(still_life(), options, "rt_embree");
+        arhost_camera view = turned(0);
+        view.intrinsics = pinhole(16, 8, 16);
+        ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK) << tracer.log();
+        EXPECT_EQ(tracer.render(view, 0).info.full_samples, samples);
+        EXPECT_EQ(!tracer.state().empty(), denoises) << samples;
+    }
+}
+
+// Light from the side, or that a mirror throws, changes the table far away from the objects.
+struct FarChange {
+    const char *name;
+    arhost_light lamp;
+    bool has_mirror;
+};
+class DenoisingOfFarChanges : public testing::TestWithParam<FarChange> {
+protected:
+    static SceneBuilder scene() {
+        scene::Settings settings;
+        settings.integrator = ARHOST_INTEGRATOR_PATH;
+        settings.ambient = glm::vec3(0);
+        settings.background = glm::vec3(0.1f);
+        SceneBuilder scene(settings);
+        scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
+        if (GetParam().has_mirror)
+            scene.add_mesh("mirror", quad({-90, -15, 40}, {-90, 15, 40}, {-90, 15, 52}, {-90, -15, 52}),
+                           mirror(0.9f));
+        else
+            scene.add_ball("ball", {-90, 0, 25, 5}, diffuse(0.7f, 0.2f, 0.1f));
+        scene.add_light(GetParam().lamp);
+        return scene;
+    }
+};
+arhost_light window() {
+    arhost_light lamp = placed(ARHOST_LIGHT_RECTANGLE, {-600, 0, 150}, 1e6f, ARHOST_FALLOFF_INVERSE_SQUARE);
+    set3(lamp.direction, 1, 0, 0);
+    set3(lamp.axis_u, 0, 100, 0);
+    set3(lamp.axis_v, 0, 0, 10);
+    return lamp;
+}
+const arhost_light far_bulb = bulb({-600, 0, 150}, 6, 1e6f, ARHOST_FALLOFF_INVERSE_SQUARE),
+                   near_bulb = bulb({-40, 0, 60}, 2, 5e3f, ARHOST_FALLOFF_INVERSE_SQUARE);
+INSTANTIATE_TEST_SUITE_P(Lamps, DenoisingOfFarChanges,
+                         testing::Values(FarChange{"sun", sun(0.97f, 0, -0.243f), false},
+                                         FarChange{"window", window(), false}, FarChange{"bulb", far_bulb, false},
+                                         FarChange{"mirror", near_bulb, true}),
+                         [](const auto &info) { return std::string(info.param.name); });
+
+TEST_P(DenoisingOfFarChanges, FindsThem) {
+    LinearTracer tracer(scene(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+    const LinearPicture truth = picture_of(scene(), converged, turned(0));
+    LinearPicture picture = tracer.render(turned(0), 0);
+    for (std::uint64_t i = 1; i < 16; ++i)
+        picture = tracer.render(turned(0), i);
+    const auto is_far = [&](std::uint32_t x, std::uint32_t) { return x > width / 2; };
+    const LinearPicture untouched = picture_of(scene(), converged, camera({0, -180, 110}, {0, -400, 110}, {0, 0, 1}));
+    EXPECT_LT(difference(picture, truth, is_far), 0.3 * difference(untouched, truth, is_far));
+    std::uint32_t same = 0;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            same += picture.value(x, y, 4) == 1 && picture.value(x, y, 5) == 1 && picture.value(x, y, 6) == 1;
+    EXPECT_GT(same, width * height / 4);
 }
 
 // After five frames, nothing is left of where a ball and its shadow were.

@@ -110,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(
              {0, -2, 8},
              {0, 0, 1},
              {0, 77, 153, 255}},
-        View{"demo", "config/scenes/demo.yaml", {20, -150, 110}, {0, 0, 15}, {0, 0, 1}, {0, 255}},
+        View{"desk", "tests/plugins/rt_embree/golden/desk.yaml", {20, -150, 110}, {0, 0, 15}, {0, 0, 1}, {0, 255}},
         View{"optix-cs", "config/scenes/optix-cs.yaml", {0, -330, 150}, {0, 0, 60}, {0, 0, 1}, {0, 255}},
         View{"vkray-cs", "config/scenes/vkray-cs.yaml", {0, 150, 330}, {0, 60, 0}, {0, 1, 0}, {0, 255}},
         View{"room",

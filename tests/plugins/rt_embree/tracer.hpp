@@ -146,7 +146,8 @@ public:
     }
 };
 
-// A plugin and its scene. The scene's arena is in read-only memory, so a plugin that writes to it crashes.
+// A plugin and its scene. The scene's arena is in read-only memory, so a plugin that writes to it crashes. Unless the
+// options say otherwise, images have one sample per pixel and are not denoised.
 class Tracer {
 public:
     explicit Tracer(scene::ArenaBuilder builder, const Options &options = {}, const std::string &plugin = "rt_embree")
@@ -155,7 +156,10 @@ public:
         std::move(builder).write({static_cast<std::byte *>(memory_), size_});
         EXPECT_EQ(scene::validate({static_cast<std::byte *>(memory_), size_}), "");
         mprotect(memory_, size_, PROT_READ);
-        EXPECT_EQ(plugin_.create(options), ARHOST_STATUS_OK) << plugin_.log();
+        Options all{{"quality", "reference"}, {"samples", "1"}};
+        for (const auto &[key, value] : options)
+            all[key] = value;
+        EXPECT_EQ(plugin_.create(all), ARHOST_STATUS_OK) << plugin_.log();
     }
     ~Tracer() {
         stop();

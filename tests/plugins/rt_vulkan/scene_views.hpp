@@ -70,7 +70,7 @@ inline bool has_glass(const arhost_scene &scene) {
 
 inline const std::vector<View> every_view = {View{"classes", "tests/plugins/rt_embree/golden/classes.yaml"},
                                              View{"room", "tests/plugins/rt_embree/golden/room.yaml", "4"},
-                                             View{"demo", "config/scenes/demo.yaml"},
+                                             View{"desk", "tests/plugins/rt_embree/golden/desk.yaml"},
                                              View{"moving", "config/scenes/moving.yaml", "4", 1.3},
                                              View{"optix-b", "config/scenes/optix-b.yaml"},
                                              View{"optix-cgd", "config/scenes/optix-cgd.yaml"},
