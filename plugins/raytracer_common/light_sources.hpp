@@ -9,6 +9,7 @@
 #include <arhost/scene.h>
 #include <arhost/shading/scalar.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -52,8 +53,8 @@ public:
     // bright the room is, if it reflects 35 % of its light. 0: neither lamps, environment, sampled emissive surfaces
     // nor a video give light. `video`: NULL if it is unknown.
     float least_irradiance(const VideoImage *video) const;
-    // Light in the middle of the virtual objects: irradiance / π at perpendicular incidence.
-    float light() const { return light_; }
+    // Irradiance / π, about, of a real surface that lamps hardly reach.
+    float faintest_light() const { return std::max(environment_radiance_, light_ / 16); }
     std::span<const Emitter> emitters() const { return emitters_; } // one per object
     // Spheres that contain the visible virtual objects, at most max_spheres.
     static constexpr std::size_t max_spheres = 16;

@@ -54,7 +54,7 @@ double lit_area(std::span<const Photon> photons, const std::array<float, 3> &low
 
 } // namespace
 
-void PhotonMap::build(std::span<const Photon> photons, bool sorts, float negligible) {
+void PhotonMap::build(std::span<const Photon> photons, const PhotonMapOptions &options) {
     photons_.clear();
     levels_.clear();
     std::ranges::copy_if(photons, std::back_inserter(photons_),
@@ -80,17 +80,19 @@ void PhotonMap::build(std::span<const Photon> photons, bool sorts, float negligi
                                     (std::numbers::pi * static_cast<double>(photons_.size())));
     levels_.resize(max_levels);
     levels_[0].radius = std::max(static_cast<float>(radius), extent * 1e-4f);
+    for (std::size_t i = 0; i < 3; ++i)
+        low_[i] -= options.shift[i] * 2 * levels_[0].radius;
     for (std::size_t i = 0; i < levels_.size(); ++i) {
         if (i > 0)
             levels_[i].radius = levels_[i - 1].radius / 2;
-        if (sorts)
+        if (options.sorts)
             sort(photons_, low_, levels_[i]);
     }
-    mark_near(negligible);
+    mark_near(options.negligible);
 }
 
 void PhotonMap::mark_near(float negligible) {
-    near_.assign(near_bits / 32, 0);
+    near_.assign(std::size_t{near_levels} * near_bits / 32, 0);
     using Cell = std::array<std::int32_t, 3>;
     const float side = 2 * levels_[0].radius;
     std::vector<std::pair<Cell, float>> powers(photons_.size());
@@ -101,19 +103,30 @@ void PhotonMap::mark_near(float negligible) {
         return std::pair(cell, std::max({photon.power[0], photon.power[1], photon.power[2]}));
     });
     std::ranges::sort(powers);
+    std::vector<Cell> cells; // with enough light
     for (auto next = powers.begin(); next != powers.end();) {
         const Cell cell = next->first;
         float power = 0;
         for (; next != powers.end() && next->first == cell; ++next)
             power += next->second;
-        if (power < negligible * side * side)
-            continue;
-        for (int neighbour = 0; neighbour < 27; ++neighbour) {
-            const std::uint32_t bit = PhotonGrid::hash(cell[0] + neighbour % 3 - 1, cell[1] + neighbour / 3 % 3 - 1,
-                                                       cell[2] + neighbour / 9 - 1) %
-                                      near_bits;
-            near_[bit / 32] |= static_cast<std::int32_t>(1u << bit % 32);
-        }
+        if (power >= negligible * side * side)
+            cells.push_back(cell);
+    }
+    for (std::int32_t level = 0; level < near_levels; ++level) {
+        std::int32_t *const bits = near_.data() + std::ptrdiff_t{level} * near_bits / 32;
+        for (const Cell &cell : cells)
+            for (int neighbour = 0; neighbour < 27; ++neighbour) {
+                const std::uint32_t bit =
+                    PhotonGrid::hash(cell[0] + neighbour % 3 - 1, cell[1] + neighbour / 3 % 3 - 1,
+                                     cell[2] + neighbour / 9 - 1) %
+                    near_bits;
+                bits[bit / 32] |= static_cast<std::int32_t>(1u << bit % 32);
+            }
+        for (Cell &cell : cells)
+            for (std::int32_t &coordinate : cell)
+                coordinate >>= 1;
+        std::ranges::sort(cells);
+        cells.erase(std::ranges::unique(cells).begin(), cells.end());
     }
 }
 

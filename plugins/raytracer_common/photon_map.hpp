@@ -42,6 +42,12 @@ struct PhotonGrid {
     }
 };
 
+struct PhotonMapOptions {
+    bool sorts = true;            // else the levels only have a radius
+    float negligible = 0;         // irradiance / π; near() does not have cells that receive less from photons
+    std::array<float, 3> shift{}; // of the grids, in cells of the first level: 0 to 1
+};
+
 // Grids of the same photons whose cells are half as large from level to level: where photons are dense, a density
 // estimate needs a small radius.
 class PhotonMap {
@@ -49,15 +55,15 @@ public:
     static constexpr std::size_t max_levels = 6;
     static constexpr int photons_per_estimate = 24; // about
 
-    // Keeps the photons that arrived somewhere. `sorts`: else the levels only have a radius. `negligible`: near()
-    // does not have cells whose photons bring less than this irradiance, divided by π.
-    void build(std::span<const Photon> photons, bool sorts = true, float negligible = 0);
+    // Keeps the photons that arrived somewhere.
+    void build(std::span<const Photon> photons, const PhotonMapOptions &options = {});
 
     std::span<const Photon> photons() const { return photons_; }
     std::span<const PhotonGrid> levels() const { return levels_; } // empty if no photon arrived
-    // A bit for each number PhotonGrid::hash() modulo near_bits: set for the cells of the first level that contain
-    // photons, and for their neighbours.
-    static constexpr std::int32_t near_bits = 1 << 16;
+    // near_bits bits for each of near_levels grids, whose cells are as large as those of the first level, and twice
+    // as large from grid to grid. The bit of a cell is PhotonGrid::hash() modulo near_bits. It is set for cells that
+    // contain photons, and for their neighbours.
+    static constexpr std::int32_t near_bits = 1 << 16, near_levels = 6;
     std::span<const std::int32_t> near() const { return near_; }
     const std::array<float, 3> &low() const { return low_; } // mm: corner of cell (0, 0, 0) of all grids
 

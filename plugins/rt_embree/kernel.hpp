@@ -158,15 +158,20 @@ inline constexpr std::int32_t virtual_face = 6;
 // The photons of one face in a cell of a grid whose side is twice the radius of a PhotonGrid.
 struct PhotonCell {
     static constexpr int floats = 8;
+    // Cells with more photons are replaced by those of the next level. A limit of a sample is at least this.
+    static constexpr std::int32_t least_limit = 4;
     float power[3];     // sum
     float direction[3]; // sum of the directions along which they arrive, weighted by power
     std::int32_t count;
-    std::uint32_t key; // of cell and face
+    std::uint32_t key; // of cell, face and level
 
-    static std::uint32_t key_of(std::int32_t x, std::int32_t y, std::int32_t z, std::int32_t face) {
+    static std::uint32_t key_of(std::int32_t x, std::int32_t y, std::int32_t z, std::int32_t face,
+                                std::int32_t level) {
         return static_cast<std::uint32_t>(x) * 2654435761u + static_cast<std::uint32_t>(y) * 2246822519u +
-               static_cast<std::uint32_t>(z) * 3266489917u + static_cast<std::uint32_t>(face);
+               static_cast<std::uint32_t>(z) * 3266489917u +
+               static_cast<std::uint32_t>(8 * level + face) * 668265263u;
     }
+    static std::uint32_t hash(std::uint32_t key) { return key ^ key >> 15; }
 };
 static_assert(sizeof(PhotonCell) == PhotonCell::floats * sizeof(float));
 
@@ -176,10 +181,11 @@ struct Photons {
     float low[3];
     PhotonGrid levels[arhost::raytracer_common::PhotonMap::max_levels];
     std::int32_t level_count;
-    // With denoising: hash tables of PhotonCell, cells_per_level for each level. A cell is at the index
-    // PhotonGrid::hash() modulo cells_per_level, a power of two, or follows it; a cell with count 0 ends the search.
+    // With denoising: a hash table of PhotonCell. A cell is at the index PhotonCell::hash() modulo its size, a power
+    // of two, or follows it; a cell with count 0 ends the search. `near`, `low` and the radii of `levels` are set,
+    // too.
     const float *cells;
-    std::int32_t cells_per_level;
+    std::int32_t cell_mask; // size − 1
 };
 
 inline constexpr std::int32_t most_few_sources = 16;
@@ -358,8 +364,8 @@ struct Scratch {
 using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &scratch);
 
 // Traces the photons with the numbers from `first` on. `to`, `faces`: one element per photon. The face of a photon is
-// virtual_face if it arrived at a virtual surface. At a real one, it is 2 · axis of the largest component of the
-// normal, plus 1 if this component is positive.
+// virtual_face if it arrived at a virtual surface. At a real one, it is 2 · axis of about the largest component of
+// the normal, plus 1 if this component is positive.
 using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint32_t count,
                               arhost::raytracer_common::Photon *to, std::int8_t *faces);
 

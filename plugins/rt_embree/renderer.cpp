@@ -13,6 +13,7 @@
 #include <cstring>
 #include <limits>
 #include <mutex>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -179,6 +180,7 @@ void Renderer::set_size(const arhost_camera &camera) {
 
 void Renderer::place_lights() {
     lights_->place(scene_.placed_objects());
+    photon_sums_ = {};
     scene_.set_emitters(lights_->emitters());
     const auto spheres = lights_->specular_spheres();
     photon_targets_.set(scene_.arena(), {spheres.begin(), spheres.end()});
@@ -188,12 +190,22 @@ void Renderer::place_lights() {
         few_sources_[i % rows * most_few_sources + i / rows] = records[i];
 }
 
-// Sends photons from the lamps to mirrors and glass.
-void Renderer::trace_photons(Frame &frame) {
+// Sends photons from the lamps to mirrors and glass. With denoising, frames take turns with a few sets of photons, so
+// that a scene at rest soon needs no new ones.
+void Renderer::trace_photons(Frame &frame, std::uint64_t sequence) {
     constexpr std::uint32_t chunk = 1 << 12;
     const std::uint32_t count = arhost::raytracer_common::photon_count(photons_per_sample_, frame.sample_count);
     if (photon_targets_.empty() || count == 0)
         return;
+    const std::size_t set = sequence % photon_sums_.size();
+    if (frame.denoising) {
+        if (count != std::exchange(photons_per_set_, count))
+            photon_sums_ = {};
+        if (photon_sums_[set]) {
+            frame.path.photons = photon_sums_[set]->view();
+            return;
+        }
+    }
     Caustics &caustics = frame.path.caustics;
     caustics.spheres = photon_targets_.spheres().data()->data();
     caustics.cumulative = photon_targets_.cumulative().data();
@@ -202,7 +214,8 @@ void Renderer::trace_photons(Frame &frame) {
     caustics.lamp_count = static_cast<std::int32_t>(frame.scene.light_count);
     caustics.scene_extent = arhost::raytracer_common::scene_extent(scene_.arena());
     caustics.photon_count = count;
-    caustics.first_number = frame.first_random * photons_per_sample_;
+    caustics.first_number =
+        frame.denoising ? static_cast<std::uint32_t>(set) * count : frame.first_random * photons_per_sample_;
     photons_.resize(count);
     photon_faces_.resize(count);
     threads_.for_each((count + chunk - 1) / chunk, [&](std::size_t i, std::size_t) {
@@ -213,9 +226,22 @@ void Renderer::trace_photons(Frame &frame) {
     });
     if (!frame.goes_on(frame.progress))
         return;
-    // Denoising leaves out light that is too weak to be seen.
-    photon_map_.build(photons_, !frame.denoising, frame.denoising ? lights_->light() / 1024 : 0);
     Photons &photons = frame.path.photons;
+    if (frame.denoising) {
+        // Light that is too weak to be seen is left out. Each set has its own grid, so that its steps are no edges of
+        // the picture.
+        const auto fraction = [&](double irrational) {
+            const double at = static_cast<double>(set + 1) * irrational;
+            return static_cast<float>(at - std::floor(at));
+        };
+        photon_map_.build(photons_,
+                          {.sorts = false,
+                           .negligible = lights_->faintest_light() / 1024,
+                           .shift = {fraction(0.8191725134), fraction(0.6710436067), fraction(0.5497004779)}});
+        photons = photon_sums_[set].emplace(photon_map_, photons_, photon_faces_).view();
+        return;
+    }
+    photon_map_.build(photons_);
     if (photon_map_.photons().empty())
         return;
     photons.photons = photon_map_.photons().data()->position;
@@ -224,15 +250,18 @@ void Renderer::trace_photons(Frame &frame) {
     for (const arhost::raytracer_common::PhotonGrid &from : photon_map_.levels())
         photons.levels[photons.level_count++] = {from.numbers.data(), from.starts.data(),
                                                  static_cast<std::int32_t>(from.starts.size()) - 2, from.radius};
-    if (frame.denoising)
-        photon_sums_.build(photon_map_, photons_, photon_faces_, photons);
 }
 
 // Whether the kernel can tell where virtual objects do not change the light of a catcher.
 bool Renderer::finds_unchanged() const {
     constexpr std::uint32_t most_lamps = 64; // the time is proportional to their number
-    return scene_.view().light_count <= most_lamps &&
-           std::ranges::none_of(lights_->emitters(), [](const auto &emitter) { return emitter.density > 0; });
+    const auto shines = [](const Object &object) {
+        return object.role == ARHOST_ROLE_VIRTUAL &&
+               std::ranges::any_of(object.material->emission, [](float channel) { return channel > 0; });
+    };
+    const Scene &scene = scene_.view();
+    return scene.light_count <= most_lamps &&
+           std::ranges::none_of(std::span(scene.objects, scene_.placed_objects().size()), shines);
 }
 
 PathScene Renderer::path_scene() const {
@@ -339,7 +368,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (frame.denoising && finds_unchanged())
         frame.path.wide_catcher = windows.wide_catcher();
     if (lights_)
-        trace_photons(frame);
+        trace_photons(frame, sequence);
     const RenderTile render_tile = lights_ ? kernel_.render_path_tile : kernel_.render_tile;
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;

@@ -70,7 +70,7 @@ private:
     void place_lights();
     PathScene path_scene() const;
     bool finds_unchanged() const;
-    void trace_photons(Frame &frame);
+    void trace_photons(Frame &frame, std::uint64_t sequence);
 
     arhost::Host host_;
     const arhost_intrinsics full_intrinsics_; // the intrinsics passed to start
@@ -98,7 +98,10 @@ private:
     std::vector<arhost::raytracer_common::Photon> photons_;
     std::vector<std::int8_t> photon_faces_; // see TracePhotons
     arhost::raytracer_common::PhotonMap photon_map_;
-    PhotonSums photon_sums_;
+    static constexpr std::size_t photon_sets = 16;
+    std::array<std::optional<PhotonSums>, photon_sets>
+        photon_sums_; // of the scene as it is placed; empty: not traced
+    std::uint32_t photons_per_set_ = 0;
     arhost::raytracer_common::VideoImage video_;
     bool has_video_ = false; // of the current frame
     float max_radius_squared_;

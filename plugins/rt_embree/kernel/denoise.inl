@@ -192,7 +192,7 @@ ARHOST_INLINE Float limit_by_neighbours(const Denoising &denoising, std::ptrdiff
             brightest = max(brightest, select(same, luminance(load3(denoising.light[0], there)), Float(0.0f)));
             count = count + select(same, Float(1.0f), Float(0.0f));
         }
-    return select(count < Float(3.0f), Float(far_away), brightest * Float(4.0f) + Float(0.02f));
+    return select(count < Float(3.0f), Float(far_away), brightest * Float(4.0f) + Float(0.1f));
 }
 
 // Returns the light of a row's pixels without fireflies: single paths that find a small bright light would remain
@@ -425,6 +425,84 @@ ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
     return edge & ((lane_numbers() + Int(x)) < Int(denoising.width));
 }
 
+// A pixel at an edge, and its ray in Rays::blocks.
+struct EdgePixel {
+    std::int32_t x, y;
+    const float *ray;
+};
+
+// Finds the taps of two pixels. Lanes are their rays.
+ARHOST_INLINE void find_taps_of(const Frame &frame, const EdgePixel &one, const EdgePixel &other) {
+    const Denoising &denoising = *frame.denoising;
+    const Bool is_one = lane_numbers() < Int(tap_count);
+    const auto row = [&](int i) __attribute__((always_inline)) {
+        return select(is_one, Float(one.ray[lanes * i]), Float(other.ray[lanes * i]));
+    };
+    const auto rays = [&](int first, float z) __attribute__((always_inline)) {
+        first *= frame.rays.dimensions;
+        return Vec3{row(first), row(first + 1), frame.rays.dimensions == 3 ? row(first + 2) : Float(z)};
+    };
+    // A lattice with a different row and column for each ray.
+    static_assert(lanes == 2 * tap_count);
+    alignas(64) static constexpr float columns[lanes] = {3, 6, 1, 4, 7, 2, 5, 0, 3, 6, 1, 4, 7, 2, 5, 0};
+    const auto offset = [](Float number) __attribute__((always_inline)) {
+        return (number + Float(0.5f)) * Float(1.0f / tap_count) - Float(0.5f);
+    };
+    const Vec3 in_camera = rays(0, 1) + rays(1, 0) * offset(load(columns)) +
+                           rays(2, 0) * offset(to_float(lane_numbers() & Int(tap_count - 1)));
+    const Vec3 direction = transform(frame.camera.world_from_camera, in_camera);
+    const Bool has_ray = direction.x == direction.x;
+    const PrimaryHits hits = trace_primary(frame.scene, splat(frame.camera.eye), direction, has_ray, has_ray);
+    Int surface(0);
+    Float far(0.0f);
+    if (any(hits.is_virtual)) {
+        surface = select(hits.is_virtual, surface_of(frame.scene, hits.rays.hit, hits.is_virtual), surface);
+        far = select(hits.is_virtual, load(hits.rays.ray.tfar), far);
+    }
+    if (any(hits.caught)) {
+        surface = select(hits.caught, surface_of(frame.scene, hits.catcher_rays.hit, hits.caught), surface);
+        far = select(hits.caught, load(hits.catcher_rays.ray.tfar), far);
+    }
+    const Vec3 position = splat(frame.camera.eye) + direction * far;
+    const float *const *guides = denoising.guides;
+    Int chosen = select(surface == Int(0), Int(no_tap), Int(own_tap));
+    Float least(1e30f);
+    for (int tap = 0; tap < 9; ++tap) {
+        const int dx = tap % 3 - 1, dy = tap / 3 - 1;
+        const bool inside[] = {one.y + dy >= 0 && one.y + dy < denoising.height,
+                               other.y + dy >= 0 && other.y + dy < denoising.height};
+        const std::ptrdiff_t at[] = {guide_at(denoising, one.x + dx, inside[0] ? one.y + dy : one.y),
+                                     guide_at(denoising, other.x + dx, inside[1] ? other.y + dy : other.y)};
+        const auto surface_there = [&](int i) __attribute__((always_inline)) {
+            return Int(inside[i] ? __builtin_bit_cast(int, guides[surface_guide][at[i]]) : 0);
+        };
+        const Int number = select(is_one, surface_there(0), surface_there(1)) & Int(mirrored_unit - 1);
+        const Bool flat = (number == Int(unchanged_surface)) & (surface == Int(denoising.flat_surface));
+        const Bool same = (flat | (number == surface)) & (surface != Int(0));
+        if (!any(same))
+            continue;
+        const auto value = [&](int guide) __attribute__((always_inline)) {
+            return select(is_one, Float(guides[guide][at[0]]), Float(guides[guide][at[1]]));
+        };
+        const auto vector = [&](int first) __attribute__((always_inline)) {
+            return Vec3{value(first), value(first + 1), value(first + 2)};
+        };
+        const Float from_plane = abs(dot(vector(normal_guide), vector(position_guide) - position));
+        const Float apart = select(flat | is_kind(surface, specular_surface), Float(0.0f), from_plane) +
+                            Float(tap == own_tap ? 0.0f : 1e-3f) * far;
+        const Bool nearer = same & (apart < least);
+        least = select(nearer, apart, least);
+        chosen = select(nearer, Int(tap), chosen);
+    }
+    alignas(64) int values[lanes];
+    store(values, chosen);
+    unsigned taps[2] = {};
+    for (int i = 0; i < lanes; ++i)
+        taps[i / tap_count] |= static_cast<unsigned>(values[i]) << 4 * (i % tap_count);
+    denoising.taps[history_at(denoising, one.x, one.y)] = taps[0];
+    denoising.taps[history_at(denoising, other.x, other.y)] = taps[1];
+}
+
 // Finds the taps of the pixels of a tile.
 ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
     const Denoising &denoising = *frame.denoising;
@@ -439,67 +517,21 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
     if (!has_edges)
         return;
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
+    EdgePixel waiting{};
     for_each_block(all, [&](int number, int x0, int y0, int width, int height) {
-        unsigned edge_lanes = 0;
         for (int row = 0; row < height; ++row)
-            for (int column = 0; column < width; ++column)
-                edge_lanes |= unsigned{denoising.taps[history_at(denoising, x0 + column, y0 + row)] == 0}
-                              << (block * row + column);
-        if (edge_lanes == 0)
-            return;
-        const Bool edges = ((Int(static_cast<int>(edge_lanes)) >> lane_numbers()) & Int(1)) == Int(1);
-        const Int x = Int(x0) + (lane_numbers() & Int(block - 1)), y = Int(y0) + (lane_numbers() >> Int(2));
-        const float *const *guides = denoising.guides;
-        Int taps(0);
-        for (int i = 0; i < tap_count; ++i) {
-            // A lattice with a different row and column for each ray.
-            constexpr int columns[tap_count] = {3, 6, 1, 4, 7, 2, 5, 0};
-            const float dx = (static_cast<float>(columns[i]) + 0.5f) / tap_count - 0.5f,
-                        dy = (static_cast<float>(i) + 0.5f) / tap_count - 0.5f;
-            const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), dx, dy);
-            const Bool has_ray = edges & (direction.x == direction.x);
-            const PrimaryHits hits = trace_primary(frame.scene, splat(frame.camera.eye), direction, has_ray, has_ray);
-            Int surface(0);
-            Float far(0.0f);
-            if (any(hits.is_virtual)) {
-                surface = select(hits.is_virtual, surface_of(frame.scene, hits.rays.hit, hits.is_virtual), surface);
-                far = select(hits.is_virtual, load(hits.rays.ray.tfar), far);
-            }
-            if (any(hits.caught)) {
-                surface = select(hits.caught, surface_of(frame.scene, hits.catcher_rays.hit, hits.caught), surface);
-                far = select(hits.caught, load(hits.catcher_rays.ray.tfar), far);
-            }
-            const Vec3 position = splat(frame.camera.eye) + direction * far;
-            Int chosen = select(surface == Int(0), Int(no_tap), Int(own_tap));
-            Float least(1e30f);
-            for (int tap = 0; tap < 9; ++tap) {
-                const Int tap_x = x + Int(tap % 3 - 1), tap_y = y + Int(tap / 3 - 1);
-                const Bool inside = edges & (Int(-1) < tap_y) & (tap_y < Int(denoising.height));
-                const Int at = select(inside, tap_y * Int(denoising.guide_stride()) + tap_x + Int(Denoising::margin),
-                                      Int(Denoising::margin));
-                const Int number = bits_of(gather(guides[surface_guide], at)) & Int(mirrored_unit - 1);
-                const Bool flat = (number == Int(unchanged_surface)) & (surface == Int(denoising.flat_surface));
-                const Bool same = inside & (flat | (number == surface)) & (surface != Int(0));
-                if (!any(same))
+            for (int column = 0; column < width; ++column) {
+                const int x = x0 + column, y = y0 + row;
+                if (denoising.taps[history_at(denoising, x, y)] == only_own)
                     continue;
-                const Vec3 away = gather3(guides + position_guide, at) - position;
-                const Float from_plane = abs(dot(gather3(guides + normal_guide, at), away));
-                const Float apart = select(flat | is_kind(surface, specular_surface), Float(0.0f), from_plane) +
-                                    Float(tap == own_tap ? 0.0f : 1e-3f) * far;
-                const Bool nearer = same & (apart < least);
-                least = select(nearer, apart, least);
-                chosen = select(nearer, Int(tap), chosen);
+                const EdgePixel pixel{x, y, rays + number * frame.rays.block_size() + block * row + column};
+                if (waiting.ray)
+                    find_taps_of(frame, waiting, pixel);
+                waiting = waiting.ray ? EdgePixel{} : pixel;
             }
-            taps = taps | (chosen << Int(4 * i));
-        }
-        alignas(64) int values[lanes];
-        store(values, taps);
-        for (unsigned remaining = edge_lanes; remaining; remaining &= remaining - 1) {
-            const int lane = __builtin_ctz(remaining);
-            denoising.taps[history_at(denoising, x0 + lane % block, y0 + lane / block)] =
-                static_cast<unsigned>(values[lane]);
-        }
     });
+    if (waiting.ray)
+        find_taps_of(frame, waiting, waiting);
 }
 
 // Writes pixels of a row that virtual objects do not affect.

@@ -81,7 +81,7 @@ ARHOST_INLINE Float virtual_density(const PathScene &path, const Surface &s, Vec
 
 // Objects whose form factors have a smaller sum reflect no light to a catcher, so that they do not affect the whole
 // desk.
-constexpr float least_form_factor = 1.0f / 256;
+constexpr float least_form_factor = 1.0f / 512;
 
 // Chance of a ray from a catcher towards the virtual objects, from the sum of their form factors.
 ARHOST_INLINE Float bounce_chance(Float form_factors) {

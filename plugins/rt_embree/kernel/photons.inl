@@ -116,7 +116,8 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
 
 // See TracePhotons.
 ARHOST_INLINE Int face_of(Vec3 normal) {
-    const Float x = abs(normal.x), y = abs(normal.y), z = abs(normal.z);
+    // Slopes of exactly 45° keep clear of the limits.
+    const Float x = abs(normal.x), y = abs(normal.y) * Float(1.01f), z = abs(normal.z) * Float(1.02f);
     const auto side = [](Float a, int axis) __attribute__((always_inline)) {
         return select(a > Float(0.0f), Int(2 * axis + 1), Int(2 * axis));
     };
@@ -216,16 +217,26 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
     }
 }
 
-// Returns the lanes in which the cell of the coarsest grid at a point, or one of its neighbours, may contain photons.
-ARHOST_INLINE Bool is_near_photons(const Photons &photons, Vec3 position) {
-    const Float inverse_cell(0.5f / photons.levels[0].radius);
-    const Vec3 at = (position - splat(photons.low)) * inverse_cell;
-    const auto cell = [](Float a) __attribute__((always_inline)) {
-        return to_int(floor(min(max(a, Float(-2.0f)), Float(1e9f))));
-    };
-    const Int bit = photon_hash(cell(at.x), cell(at.y), cell(at.z)) & Int(PhotonMap::near_bits - 1);
-    const Int word = gather(photons.near, shift_right_unsigned(bit, 5));
-    return ((word >> (bit & Int(31))) & Int(1)) == Int(1);
+// Returns the cell of a grid that contains a point. `at`: in cells, from the corner of all grids.
+ARHOST_INLINE Int photon_cell(Float at) {
+    return to_int(floor(min(max(at, Float(-2.0f)), Float(1e9f))));
+}
+
+// Returns the lanes in which photons may be within `reach` mm of a point, and at least within a cell of the coarsest
+// grid.
+ARHOST_INLINE Bool is_near_photons(const Photons &photons, Vec3 position, Float reach) {
+    Float side(2 * photons.levels[0].radius);
+    Int level(0);
+    for (int i = 1; i < PhotonMap::near_levels; ++i) {
+        const Bool wider = side < reach;
+        level = select(wider, Int(i), level);
+        side = select(wider, side * Float(2.0f), side);
+    }
+    const Vec3 at = (position - splat(photons.low)) * (Float(1.0f) / side);
+    const Int bit =
+        photon_hash(photon_cell(at.x), photon_cell(at.y), photon_cell(at.z)) & Int(PhotonMap::near_bits - 1);
+    const Int word = gather(photons.near, level * Int(PhotonMap::near_bits / 32) + shift_right_unsigned(bit, 5));
+    return (((word >> (bit & Int(31))) & Int(1)) == Int(1)) | (side < reach);
 }
 
 // The cells of a grid around surface points: two along each axis.
@@ -265,6 +276,26 @@ struct PhotonLight {
     Vec3 light, mirrored;
 };
 
+// Returns the area in which a plane meets a cell, in units of a cell's side. `from_centre`: from the centre of the
+// cell to a point of the plane. It is the derivative of the volume on one side, which is the sum over the corners of
+// signed cubes of their distances. A small area counts as a quarter, since surfaces may be curved.
+ARHOST_INLINE Float area_in_cell(Vec3 normal, Vec3 from_centre) {
+    const auto component = [](Float a) __attribute__((always_inline)) {
+        return max(abs(a), Float(0.02f));
+    };
+    const Vec3 n = normalize(Vec3{component(normal.x), component(normal.y), component(normal.z)});
+    const Float height = abs(dot(from_centre, normal));
+    Float sum(0.0f);
+    for (int corner = 0; corner < 8; ++corner) {
+        const auto half = [&](Float a, int axis) __attribute__((always_inline)) {
+            return corner >> axis & 1 ? a * Float(0.5f) : a * Float(-0.5f);
+        };
+        const Float along = max(height + half(n.x, 0) + half(n.y, 1) + half(n.z, 2), Float(0.0f));
+        sum = __builtin_popcount(static_cast<unsigned>(corner)) & 1 ? sum + along * along : sum - along * along;
+    }
+    return max(sum / (n.x * n.y * n.z * Float(2.0f)), Float(0.25f));
+}
+
 // As photon_density(), but from the sums of the cells at random points nearby: on average over frames and
 // neighbouring pixels, there are no steps between cells.
 template <class LightOf>
@@ -274,25 +305,24 @@ ARHOST_INLINE PhotonLight summed_photons(const Photons &photons, const Surface &
     const float *cells = photons.cells;
     Vec3 irradiance = black(), to_light = s.geometric_normal;
     // A cell with more photons is replaced by smaller ones. A random limit hides where their size changes.
-    const Int limit = to_int(Float(4.0f) + random.u * Float(8.0f));
-    const Float third = random.u * Float(256.0f) - floor(random.u * Float(256.0f));
+    const auto low_bits = [](Float a) __attribute__((always_inline)) {
+        return a * Float(256.0f) - floor(a * Float(256.0f));
+    };
+    const Int limit = to_int(Float(static_cast<float>(PhotonCell::least_limit)) + low_bits(random.v) * Float(8.0f));
+    const Float third = low_bits(random.u);
     for (std::int32_t level = 0; level < photons.level_count && any(active); ++level) {
         const float side = 2 * photons.levels[level].radius;
         const Vec3 any_offset = Vec3{random.u - Float(0.5f), random.v - Float(0.5f), third - Float(0.5f)} * side;
         const Vec3 offset = any_offset - s.geometric_normal * dot(any_offset, s.geometric_normal);
         const Vec3 at = (s.position + offset - splat(photons.low)) * Float(1 / side);
-        const auto cell = [](Float a) __attribute__((always_inline)) {
-            return to_int(floor(min(max(a, Float(-2.0f)), Float(1e9f))));
-        };
-        const Int x = cell(at.x), y = cell(at.y), z = cell(at.z);
-        // As PhotonCell::key_of.
+        const Int x = photon_cell(at.x), y = photon_cell(at.y), z = photon_cell(at.z);
+        // As PhotonCell::key_of and hash.
         const Int key = x * Int(static_cast<int>(2654435761u)) + y * Int(static_cast<int>(2246822519u)) +
-                        z * Int(static_cast<int>(3266489917u)) + face;
-        Int slot = photon_hash(x, y, z) & Int(photons.cells_per_level - 1), count(0);
+                        z * Int(static_cast<int>(3266489917u)) + (Int(8 * level) + face) * Int(668265263);
+        Int slot = (key ^ shift_right_unsigned(key, 15)) & Int(photons.cell_mask), count(0);
         Vec3 power = black(), towards = black();
         for (Bool searching = active; any(searching);) {
-            const Int first = (Int(level * photons.cells_per_level) + slot) * Int(PhotonCell::floats);
-            const Int here = select(searching, first, Int(0));
+            const Int here = select(searching, slot * Int(PhotonCell::floats), Int(0));
             const auto vector = [&](int row) __attribute__((always_inline)) {
                 return Vec3{gather(cells + row, here), gather(cells + row + 1, here), gather(cells + row + 2, here)};
             };
@@ -304,12 +334,19 @@ ARHOST_INLINE PhotonLight summed_photons(const Photons &photons, const Surface &
                 towards = select(found, -vector(3), towards);
             }
             searching = searching & ~found & (Int(0) < number);
-            slot = (slot + Int(1)) & Int(photons.cells_per_level - 1);
+            slot = (slot + Int(1)) & Int(photons.cell_mask);
         }
         // At the finest level a cell may hold all photons.
         const Bool dense = active & (limit < count) & bool_of(level + 1 < photons.level_count);
         const Bool here = active & ~dense & (Int(0) < count);
-        irradiance = select(here, power * Float(1 / (side * side)), irradiance);
+        if (any(here)) {
+            const auto from_centre = [](Float a) __attribute__((always_inline)) {
+                return a - floor(a) - Float(0.5f);
+            };
+            const Float area =
+                area_in_cell(s.geometric_normal, {from_centre(at.x), from_centre(at.y), from_centre(at.z)});
+            irradiance = select(here, power * (Float(1 / (side * side)) / area), irradiance);
+        }
         to_light = select(here, towards, to_light);
         active = dense;
     }
@@ -368,7 +405,7 @@ ARHOST_INLINE PhotonLight photon_light(const Work &work, const Paths &paths, con
     PhotonLight sum{black(), black()};
     if (photons.level_count == 0)
         return sum;
-    active = active & is_near_photons(photons, s.position);
+    active = active & is_near_photons(photons, s.position, Float(0.0f));
     if (!any(active))
         return sum;
     if (photons.cells)

@@ -40,8 +40,12 @@ ARHOST_INLINE Bool meets_rectangle(const arhost_light &lamp, Vec3 point, const T
     return (Float(0.05f) >= steepest) | (radius * radius >= u * u + v * v);
 }
 
-// Returns the lanes in which virtual objects can change the light of a real surface by more than a share of about
-// least_form_factor, within `reach` mm of a point.
+// Objects whose form factors have a smaller sum change the light of a catcher by about a code or less, unless they
+// emit light.
+constexpr float least_visible_form_factor = 1.0f / 256;
+
+// Returns the lanes in which virtual objects can visibly change the light of a real surface within `reach` mm of a
+// point.
 ARHOST_INLINE Bool may_change(const Frame &frame, const Surface &s, Float reach) {
     const PathScene &path = frame.path;
     const Scene &scene = frame.scene;
@@ -65,7 +69,8 @@ ARHOST_INLINE Bool may_change(const Frame &frame, const Surface &s, Float reach)
             if (light.type != ARHOST_LIGHT_DIRECTIONAL)
                 shining = cone_to(splat(light.position), Float(bounding_radius_of(light)));
             const Float overlap = object.cosine * shining.cosine - object.sine * shining.sine;
-            Bool hides = dot(object.axis, shining.axis) >= overlap - Float(1e-4f);
+            // Within the sphere, the lamp may be in any direction.
+            Bool hides = (dot(object.axis, shining.axis) >= overlap - Float(1e-4f)) | (shining.sine >= Float(1.0f));
             if (light.type == ARHOST_LIGHT_RECTANGLE && any(hides))
                 hides = hides & meets_rectangle(light, s.position, object, reach);
             changes = changes | hides;
@@ -78,18 +83,7 @@ ARHOST_INLINE Bool may_change(const Frame &frame, const Surface &s, Float reach)
         const Vec3 mean = sample_texture(scene, path.irradiance, equirectangular_u(d), equirectangular_v(d)).colour;
         brightness = max(Float(path.brightest_texel) / max(luminance(mean), Float(1e-6f)), brightness);
     }
-    return changes | (form_factors * brightness >= Float(least_form_factor));
-}
-
-// Returns the lanes whose surface photons may reach within `reach` mm.
-ARHOST_INLINE Bool may_have_photons(const Photons &photons, const Surface &s, Float reach) {
-    Bool near = is_near_photons(photons, s.position);
-    for (int axis = 0; axis < 3; ++axis) {
-        const Vec3 step{axis == 0 ? reach : Float(0.0f), axis == 1 ? reach : Float(0.0f),
-                        axis == 2 ? reach : Float(0.0f)};
-        near = near | is_near_photons(photons, s.position + step) | is_near_photons(photons, s.position - step);
-    }
-    return near;
+    return changes | (form_factors * brightness >= Float(least_visible_form_factor));
 }
 
 // Finds the blocks of a tile that show only the wide catcher, unchanged. `unchanged`: one element per block. Returns
@@ -142,7 +136,7 @@ ARHOST_FUNCTION bool find_unchanged(const Frame &frame, const Tile &tile, const 
                 s.distance * Float(1.414f * block * frame.denoising->pixel_angle) / max(facing, Float(1e-3f));
             result = result & (facing > Float(0.1f)) & ~may_change(frame, s, reach);
             if (frame.path.photons.level_count > 0 && any(result))
-                result = result & ~may_have_photons(frame.path.photons, s, reach);
+                result = result & ~is_near_photons(frame.path.photons, s.position, reach);
         }
         const unsigned bits = mask_of(result.lane);
         for (int i = 0; i < lanes && first + i < count; ++i) {

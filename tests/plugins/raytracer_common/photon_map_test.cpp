@@ -22,12 +22,13 @@ std::vector<Photon> photons_on_a_table() {
     return photons;
 }
 
-bool is_near(const PhotonMap &map, float x, float y, float z) {
-    const float position[] = {x, y, z};
+bool is_near(const PhotonMap &map, float x, float y, float z, std::uint32_t level = 0) {
+    const float position[] = {x, y, z}, side = 2 * map.levels()[0].radius * static_cast<float>(1u << level);
     std::int32_t cell[3];
     for (std::size_t i = 0; i < 3; ++i)
-        cell[i] = static_cast<std::int32_t>(std::floor((position[i] - map.low()[i]) / (2 * map.levels()[0].radius)));
-    const std::uint32_t bit = PhotonGrid::hash(cell[0], cell[1], cell[2]) % PhotonMap::near_bits;
+        cell[i] = static_cast<std::int32_t>(std::floor((position[i] - map.low()[i]) / side));
+    const std::uint32_t bit =
+        PhotonGrid::hash(cell[0], cell[1], cell[2]) % PhotonMap::near_bits + level * PhotonMap::near_bits;
     return (map.near()[bit / 32] >> (bit % 32) & 1) != 0;
 }
 
@@ -45,9 +46,21 @@ TEST(PhotonMap, MarksTheCellsOfPhotonsAndTheirNeighbours) {
     EXPECT_LT(marked, 10);
 }
 
+TEST(PhotonMap, MarksLargerCells) {
+    PhotonMap map;
+    map.build(photons_on_a_table(), {.sorts = false, .shift = {0.3f, 0.6f, 0.9f}});
+    for (std::uint32_t level = 1; level < PhotonMap::near_levels; ++level) {
+        const float reach = 1.8f * map.levels()[0].radius * static_cast<float>(1u << level);
+        for (const float x : {100.0f, 100 + reach})
+            for (const float y : {0.0f, -reach})
+                EXPECT_TRUE(is_near(map, x, y, 0, level)) << level;
+        EXPECT_FALSE(is_near(map, 500, 300, 500, level)) << level;
+    }
+}
+
 TEST(PhotonMap, DoesNotMarkCellsWithNegligibleLight) {
     PhotonMap map;
-    map.build(photons_on_a_table(), true, 0.1f); // irradiance / π; on the table, it is 0.2
+    map.build(photons_on_a_table(), {.negligible = 0.1f}); // irradiance / π; on the table, it is 0.2
     EXPECT_TRUE(is_near(map, 50, 50, 0));
     EXPECT_FALSE(is_near(map, 900, 900, 0));
 }

@@ -153,14 +153,13 @@ TEST_F(Denoising, LeavesOtherPixelsUntouched) {
     EXPECT_EQ(picture.info.has_region, 1);
 }
 
-// Frames of a run with a new worker for each frame.
 TEST_F(Denoising, ImagesDependOnTheRequestOnly) {
     const std::array<Options, 3> variants{{{{"quality", "realtime"}, {"threads", "1"}},
                                            {{"quality", "realtime"}, {"threads", "3"}},
                                            {{"quality", "realtime"}, {"instruction_set", "base"}}}};
     std::vector<std::unique_ptr<LinearTracer>> tracers;
     for (const Options &options : variants) {
-        tracers.push_back(std::make_unique<LinearTracer>(still_life(), options, "rt_embree"));
+        tracers.push_back(std::make_unique<LinearTracer>(with_mirror_and_glass(), options, "rt_embree"));
         ASSERT_EQ(tracers.back()->start(pinhole()), ARHOST_STATUS_OK);
     }
     for (std::uint64_t frame = 0; frame < 3; ++frame) {
@@ -171,6 +170,20 @@ TEST_F(Denoising, ImagesDependOnTheRequestOnly) {
             EXPECT_TRUE(std::ranges::equal(tracers[i]->state(), tracers[0]->state())) << frame << ", variant " << i;
         }
     }
+}
+
+// The other one has kept what it knows of a scene at rest.
+TEST(DenoisingOfMirrors, ANewWorkerRendersTheSameImage) {
+    LinearTracer old(with_mirror_and_glass(), denoised, "rt_embree"),
+        fresh(with_mirror_and_glass(), denoised, "rt_embree");
+    ASSERT_EQ(old.start(pinhole()), ARHOST_STATUS_OK) << old.log();
+    ASSERT_EQ(fresh.start(pinhole()), ARHOST_STATUS_OK) << fresh.log();
+    for (std::uint64_t i = 0; i < 20; ++i)
+        old.render(turned(0), i);
+    fresh.render(turned(0), 0);
+    std::ranges::copy(old.state(), fresh.state().begin());
+    EXPECT_EQ(fresh.render(turned(0), 20).pixels(), old.render(turned(0), 20).pixels());
+    EXPECT_TRUE(std::ranges::equal(fresh.state(), old.state()));
 }
 
 TEST_F(Denoising, IgnoresAStateOfAnotherVersionOrSize) {
@@ -257,6 +270,45 @@ TEST_P(DenoisingOfFarChanges, FindsThem) {
         for (std::uint32_t x = 0; x < width; ++x)
             same += picture.value(x, y, 4) == 1 && picture.value(x, y, 5) == 1 && picture.value(x, y, 6) == 1;
     EXPECT_GT(same, width * height / 4);
+}
+
+// Light that a mirror throws onto a table with this slope, in degrees.
+class DenoisingOfCaustics : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Slopes, DenoisingOfCaustics, testing::Values(0, 30),
+                         [](const auto &info) { return std::to_string(static_cast<int>(info.param)); });
+
+TEST_P(DenoisingOfCaustics, LoseNoLight) {
+    const auto scene = [] {
+        scene::Settings settings;
+        settings.integrator = ARHOST_INTEGRATOR_PATH;
+        settings.ambient = glm::vec3(0);
+        settings.background = glm::vec3(0.1f);
+        SceneBuilder scene(settings);
+        const double slope = GetParam() * std::numbers::pi / 180;
+        const auto corner = [&](double x, double y) {
+            return glm::vec3(x * std::cos(slope), y, x * std::sin(slope));
+        };
+        scene.add_mesh("table", quad(corner(-200, -200), corner(200, -200), corner(200, 200), corner(-200, 200)),
+                       diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
+        scene.add_mesh("mirror", quad({-30, -30, 200}, {-30, 30, 200}, {30, 30, 200}, {30, -30, 200}), mirror(0.9f));
+        scene.add_light(bulb({-60, 0, 120}, 2, 5e4f, ARHOST_FALLOFF_INVERSE_SQUARE));
+        return scene;
+    };
+    LinearTracer tracer(scene(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+    LinearPicture picture = tracer.render(turned(0), 0);
+    for (std::uint64_t i = 1; i < 32; ++i)
+        picture = tracer.render(turned(0), i);
+    const LinearPicture truth = picture_of(scene(), converged, turned(0));
+    double light = 0, expected = 0;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            if (truth.value(x, y, 4) > 1.1f) {
+                light += double{picture.value(x, y, 4)} - 1;
+                expected += double{truth.value(x, y, 4)} - 1;
+            }
+    ASSERT_GT(expected, 100);
+    EXPECT_NEAR(light / expected, 1, 0.08);
 }
 
 // After five frames, nothing is left of where a ball and its shadow were.
