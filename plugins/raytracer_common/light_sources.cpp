@@ -100,15 +100,19 @@ LightSources::LightSources(const arhost_scene &arena) : arena_(arena) {
     }
     const arhost_texture &image = elements<arhost_texture>(arena, arena.textures)[arena.environment.texture];
     const auto texels = elements<std::array<float, 4>>(arena, image.texels);
-    double sum = 0, weights = 0;
+    double sum = 0, weights = 0, brightest = 0;
     for (std::uint32_t y = 0; y < image.height; ++y) {
         const double weight = shading::equirectangular_sine((y + 0.5) / image.height);
         double row = 0;
-        for (std::uint32_t x = 0; x < image.width; ++x)
-            row += mean_of(texels[std::size_t{y} * image.width + x].data());
+        for (std::uint32_t x = 0; x < image.width; ++x) {
+            const double light = mean_of(texels[std::size_t{y} * image.width + x].data());
+            row += light;
+            brightest = std::max(brightest, light);
+        }
         sum += row * weight;
         weights += weight * image.width;
     }
+    has_sharp_environment_ = brightest * weights > 200 * sum; // a sun
     // The chances of the light sources need not follow the video.
     environment_radiance_ = static_cast<float>(sum / weights * environment_scale(arena.environment, nullptr)[0]);
 }
@@ -294,6 +298,17 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
     }
     light_ = static_cast<float>(sum);
     light_of_room_ = static_cast<float>(of_room);
+    has_sharp_lamp_ = false;
+    for (std::size_t i = 0; i < lamps; ++i) {
+        const float *from = records_.data() + i * source_rows;
+        const double half_width =
+            from[type_row] == float{ARHOST_LIGHT_RECTANGLE}
+                ? std::min(length(vector_of(from + axis_u_row)), length(vector_of(from + axis_v_row)))
+                : double{from[radius_row]};
+        const bool is_sharp = from[type_row] == float{ARHOST_LIGHT_DIRECTIONAL} ||
+                              half_width < 0.05 * length(middle - vector_of(from + position_row));
+        has_sharp_lamp_ = has_sharp_lamp_ || (is_sharp && light[i] > 0.05 * of_room);
+    }
     const auto emitters =
         static_cast<std::size_t>(std::ranges::count_if(area_of, [](double area) { return area > 0; }));
     // A small part of the samples is spread evenly, because a surface may be near a source that is far from the

@@ -55,6 +55,9 @@ public:
     float least_irradiance(const VideoImage *video) const;
     // Irradiance / π, about, of a real surface that lamps hardly reach.
     float faintest_light() const { return std::max(environment_radiance_, light_ / 16); }
+    // Whether the penumbras of a lamp, or of the environment's brightest part, may be narrower than about a tenth of
+    // the height of the objects that cast them.
+    bool casts_sharp_shadows() const { return has_sharp_lamp_ || has_sharp_environment_; }
     std::span<const Emitter> emitters() const { return emitters_; } // one per object
     // Spheres that contain the visible virtual objects, at most max_spheres.
     static constexpr std::size_t max_spheres = 16;
@@ -77,6 +80,7 @@ private:
     // Light in the middle of the virtual objects, of all sources, and of lamps and environment only: irradiance / π
     // at perpendicular incidence.
     float light_ = 0, light_of_room_ = 0;
+    bool has_sharp_lamp_ = false, has_sharp_environment_ = false;
     std::vector<std::array<float, 4>> spheres_, specular_spheres_;
 };
 

@@ -24,7 +24,7 @@ struct ObjectState {
     float world_from_object[12];
     std::uint32_t is_visible;
 };
-constexpr std::uint32_t state_version = 1;
+constexpr std::uint32_t state_version = 2;
 constexpr std::size_t alignment = 64; // of the rows, bytes
 
 std::size_t aligned(std::size_t size) {
@@ -33,11 +33,26 @@ std::size_t aligned(std::size_t size) {
 std::size_t rows_offset(std::size_t objects) {
     return aligned(sizeof(StateHeader) + sizeof(ObjectState) * objects);
 }
-std::size_t stride_of(std::size_t width) {
-    return (width + 15) / 16 * 16;
+// Returns a layer without memory for an image of this size.
+Layer make_layer(std::uint32_t width, std::uint32_t height, std::int32_t cell_px) {
+    Layer layer{};
+    layer.cell_px = cell_px;
+    layer.width = (static_cast<std::int32_t>(width) + layer.cell_px - 1) / layer.cell_px;
+    layer.height = (static_cast<std::int32_t>(height) + layer.cell_px - 1) / layer.cell_px;
+    layer.stride = (layer.width + 15) / 16 * 16;
+    return layer;
 }
-std::size_t size_of(std::size_t width, std::size_t height, std::size_t objects) {
-    return rows_offset(objects) + history_rows * sizeof(float) * stride_of(width) * height;
+// Number of values in a row of the layer's history.
+std::size_t history_plane(const Layer &layer) {
+    return static_cast<std::size_t>(layer.stride) * static_cast<std::size_t>(layer.height);
+}
+std::size_t guide_plane(const Layer &layer) {
+    return static_cast<std::size_t>(layer.guide_stride()) * static_cast<std::size_t>(layer.height);
+}
+std::size_t size_of(std::uint32_t width, std::uint32_t height, std::size_t objects, std::int32_t catcher_cell_px) {
+    return rows_offset(objects) + history_rows * sizeof(float) *
+                                      (history_plane(make_layer(width, height, 1)) +
+                                       history_plane(make_layer(width, height, catcher_cell_px)));
 }
 
 // Writes to · inverse(from): the motion from one placement to another.
@@ -62,31 +77,35 @@ void write_motion(const float *from, const float *to, float *motion) {
 
 } // namespace
 
-Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects)
-    : objects_(objects), state_size_(size_of(width, height, objects)), motion_(12 * objects) {}
+Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows)
+    : objects_(objects), catcher_cell_px_(has_sharp_shadows ? 1 : 2),
+      state_size_(size_of(width, height, objects, catcher_cell_px_)), motion_(12 * objects) {}
 
 void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
-    denoising_.width = static_cast<std::int32_t>(width);
-    denoising_.height = static_cast<std::int32_t>(height);
-    denoising_.stride = static_cast<std::int32_t>(stride_of(width));
-    const std::size_t plane = static_cast<std::size_t>(denoising_.guide_stride()) * height;
-    planes_.assign(plane * (guide_rows + 2 * light_rows), 0);
-    taps_.assign(static_cast<std::size_t>(denoising_.stride) * height, 0);
+    denoising_.objects = make_layer(width, height, 1);
+    denoising_.catchers = make_layer(width, height, catcher_cell_px_);
+    denoising_.catchers.of_catchers = true;
+    const std::array<Layer *, 2> layers{&denoising_.objects, &denoising_.catchers};
+    constexpr std::size_t planes = guide_rows + 2 * light_rows;
+    planes_.assign(planes * (guide_plane(*layers[0]) + guide_plane(*layers[1])), 0);
+    taps_.assign(history_plane(denoising_.objects), 0);
     float *next = planes_.data();
-    const auto take = [&] { return std::exchange(next, next + plane); };
-    std::ranges::generate(denoising_.guides, take);
-    for (auto &light : denoising_.light)
-        std::ranges::generate(light, take);
+    for (Layer *layer : layers) {
+        const auto take = [&] { return std::exchange(next, next + guide_plane(*layer)); };
+        std::ranges::generate(layer->guides, take);
+        for (auto &light : layer->light)
+            std::ranges::generate(light, take);
+    }
     denoising_.taps = taps_.data();
 }
 
 const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
                                  std::span<const arhost::raytracer_common::PlacedObject> objects, bool deforms,
                                  std::uint32_t sequence, std::uint32_t samples, std::int32_t flat_catcher) {
-    if (static_cast<std::uint32_t>(denoising_.width) != intrinsics.width ||
-        static_cast<std::uint32_t>(denoising_.height) != intrinsics.height)
+    if (static_cast<std::uint32_t>(denoising_.objects.width) != intrinsics.width ||
+        static_cast<std::uint32_t>(denoising_.objects.height) != intrinsics.height)
         resize(intrinsics.width, intrinsics.height);
-    const std::size_t plane = static_cast<std::size_t>(denoising_.stride) * intrinsics.height;
+    const std::array<Layer *, 2> layers{&denoising_.objects, &denoising_.catchers};
     auto *state = static_cast<std::byte *>(slots.after);
     std::memset(state, 0, rows_offset(objects_));
     StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, camera}, earlier{};
@@ -103,13 +122,14 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         std::copy_n(objects[i].world_from_object, 12, now[i].world_from_object);
         now[i].is_visible = objects[i].is_visible;
     }
-    auto *after = reinterpret_cast<float *>(state + rows_offset(objects_));
-    for (int i = 0; i < history_rows; ++i)
-        denoising_.after[i] = after + static_cast<std::size_t>(i) * plane;
-    const auto used = static_cast<std::size_t>(reinterpret_cast<std::byte *>(after + history_rows * plane) - state);
-    std::memset(state + used, 0, state_size_ - used); // of a smaller image
+    std::size_t next = rows_offset(objects_);
+    for (Layer *layer : layers)
+        for (int i = 0; i < history_rows; ++i, next += sizeof(float) * history_plane(*layer)) {
+            layer->after[i] = reinterpret_cast<float *>(state + next);
+            layer->before[i] = before ? reinterpret_cast<const float *>(before + next) : nullptr;
+        }
+    std::memset(state + next, 0, state_size_ - next); // of a smaller image
 
-    std::ranges::fill(denoising_.before, nullptr);
     denoising_.before_from_now = nullptr;
     denoising_.camera_moved = false;
     denoising_.pixel_angle = static_cast<float>(1 / intrinsics.fx);
@@ -124,9 +144,6 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         denoising_.camera_before = earlier.camera;
         denoising_.camera_moved = !std::ranges::equal(earlier.camera.eye, camera.eye) ||
                                   !std::ranges::equal(earlier.camera.world_from_camera, camera.world_from_camera);
-        const auto *rows = reinterpret_cast<const float *>(before + rows_offset(objects_));
-        for (int i = 0; i < history_rows; ++i)
-            denoising_.before[i] = rows + static_cast<std::size_t>(i) * plane;
         then = reinterpret_cast<const ObjectState *>(before + sizeof header);
         if (std::memcmp(then, now, sizeof(ObjectState) * objects_) == 0)
             then = nullptr;
@@ -144,35 +161,44 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
 }
 
 void Denoiser::clear(const Tile &tile) {
-    for (std::int32_t y = tile.pixels.y0; y < tile.pixels.y1; ++y) {
-        float *row =
-            denoising_.guides[surface_guide] + std::ptrdiff_t{y} * denoising_.guide_stride() + Denoising::margin;
-        std::fill(row + tile.pixels.x0, row + tile.pixels.x1, 0.0f);
+    for (Layer *layer : {&denoising_.objects, &denoising_.catchers}) {
+        const auto cell = [&](std::int32_t px) { return (px + layer->cell_px - 1) / layer->cell_px; };
+        for (std::int32_t y = cell(tile.pixels.y0); y < cell(tile.pixels.y1); ++y) {
+            float *row = layer->guides[surface_guide] + std::ptrdiff_t{y} * layer->guide_stride() + Layer::margin;
+            std::fill(row + cell(tile.pixels.x0), row + cell(tile.pixels.x1), 0.0f);
+        }
     }
 }
 
 Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles,
                         ThreadPool &threads) const {
     constexpr std::int32_t chunk = 8; // rows
-    const std::int32_t height = denoising_.height;
-    const auto for_each_row = [&](auto step) {
-        threads.for_each(static_cast<std::size_t>((height + chunk - 1) / chunk), [&](std::size_t i, std::size_t) {
-            const auto first = static_cast<std::int32_t>(i) * chunk;
-            for (std::int32_t row = first; row < std::min(first + chunk, height); ++row)
-                step(row);
+    const auto chunks_of = [](const Layer &layer) { return (layer.height + chunk - 1) / chunk; };
+    // Calls step(layer, row) for all rows of the layers that have more than `pass` passes.
+    const auto for_each_row = [&](int pass, auto step) {
+        const bool has_catchers = pass < denoising_.catchers.filter_passes();
+        const std::int32_t of_objects = chunks_of(denoising_.objects),
+                           of_catchers = has_catchers ? chunks_of(denoising_.catchers) : 0;
+        threads.for_each(static_cast<std::size_t>(of_objects + of_catchers), [&](std::size_t i, std::size_t) {
+            const bool is_object = static_cast<std::int32_t>(i) < of_objects;
+            const Layer &layer = is_object ? denoising_.objects : denoising_.catchers;
+            const std::int32_t first = (static_cast<std::int32_t>(i) - (is_object ? 0 : of_objects)) * chunk;
+            for (std::int32_t row = first; row < std::min(first + chunk, layer.height); ++row)
+                step(layer, row);
         });
     };
     threads.for_each(tiles.size(), [&](std::size_t i, std::size_t) {
         if (frame.goes_on(frame.progress))
             kernel.find_taps(frame, tiles[i]);
     });
-    for_each_row([&](std::int32_t row) { kernel.accumulate_row(frame, row, 0); });
+    for_each_row(0, [&](const Layer &layer, std::int32_t row) { kernel.accumulate_row(frame, layer, row); });
+    const int passes = denoising_.objects.filter_passes();
     for (int pass = 0; pass < passes; ++pass)
-        for_each_row([&](std::int32_t row) { kernel.filter_row(frame, row, pass); });
+        for_each_row(pass, [&](const Layer &layer, std::int32_t row) { kernel.filter_row(frame, layer, row, pass); });
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex mutex;
-    for_each_row([&](std::int32_t row) {
-        const Rectangle part = kernel.resolve_row(frame, row, passes);
+    for_each_row(passes, [&](const Layer &, std::int32_t row) {
+        const Rectangle part = kernel.resolve_row(frame, row);
         if (part.x0 >= part.x1)
             return;
         const std::lock_guard lock(mutex);

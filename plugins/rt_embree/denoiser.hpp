@@ -24,10 +24,8 @@ struct StateSlots {
 
 class Denoiser {
 public:
-    static constexpr int passes = 5; // of the filter
-
-    // `width`, `height`: the largest size of an image.
-    Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects);
+    // `width`, `height`: the largest size of an image. `has_sharp_shadows`: else catchers have half the resolution.
+    Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows);
 
     std::uint64_t state_size() const { return state_size_; } // bytes
 
@@ -47,6 +45,7 @@ private:
     void resize(std::uint32_t width, std::uint32_t height);
 
     std::size_t objects_;
+    std::int32_t catcher_cell_px_;
     std::uint64_t state_size_;
     std::vector<float> planes_;
     std::vector<unsigned> taps_;

@@ -260,17 +260,28 @@ enum HistoryRow : int {
     history_rows
 };
 
-// Images have rows of `stride` values, a multiple of 16. Guides and light have Denoising::margin more values on both
-// sides of a row, without a surface.
-struct Denoising {
+// A grid of the denoiser. Histories have rows of `stride` values, a multiple of 16. Guides and light have `margin`
+// more values on both sides of a row, without a surface.
+struct Layer {
     static constexpr std::int32_t margin = 16;
-    static constexpr std::size_t most_objects = most_surfaces / 4 - 2;
-    std::int32_t width, height, stride; // px
+    bool of_catchers;                   // else of virtual objects
+    std::int32_t cell_px;               // side of a cell
+    std::int32_t width, height, stride; // cells
     float *guides[guide_rows];
     float *light[2][light_rows];       // each step of the filter reads one and writes the other
-    unsigned *taps;                    // of pixels at edges: see tap_count in denoise.inl
     const float *before[history_rows]; // of the previous frame; NULL: there is none
     float *after[history_rows];
+    std::int32_t guide_stride() const { return stride + 2 * margin; }
+    // Of the filter. Those of larger cells begin with wider steps.
+    int filter_passes() const { return cell_px == 1 ? 5 : 4; }
+};
+
+struct Denoising {
+    static constexpr std::size_t most_objects = most_surfaces / 4 - 2;
+    // The light of virtual objects in each pixel, and that of catchers; if no lamp casts sharp shadows, in cells of
+    // 2×2 pixels. The guides of `objects` are also those of catchers, except of the flat one.
+    Layer objects, catchers;
+    unsigned *taps; // of pixels at edges: see tap_count in denoise.inl
     Camera camera_before;
     bool camera_moved;
     float pixel_angle;         // width of a pixel in the middle of the image, in units of its distance
@@ -282,7 +293,6 @@ struct Denoising {
     // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
     // axes. NULL if no placement has changed.
     const float *before_from_now;
-    std::int32_t guide_stride() const { return stride + 2 * margin; }
 };
 
 struct Frame {
@@ -369,16 +379,18 @@ using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &
 using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint32_t count,
                               arhost::raytracer_common::Photon *to, std::int8_t *faces);
 
-// A step of the denoiser on one row of the image, or on one tile. `pass`: of the filter.
-using DenoiseRow = void (*)(const Frame &frame, std::int32_t row, int pass);
+// A step of the denoiser on one row of a layer, or on one tile. `pass`: of the filter.
+using AccumulateRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row);
+using FilterRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
 using DenoiseTile = void (*)(const Frame &frame, const Tile &tile);
 // Writes a row of the image. Returns the bounding rectangle of the pixels that virtual objects affect.
-using ResolveRow = Rectangle (*)(const Frame &frame, std::int32_t row, int passes);
+using ResolveRow = Rectangle (*)(const Frame &frame, std::int32_t row);
 
 struct Kernel {
     RenderTile render_tile, render_path_tile;
     TracePhotons trace_photons;
-    DenoiseRow accumulate_row, filter_row;
+    AccumulateRow accumulate_row;
+    FilterRow filter_row;
     DenoiseTile find_taps;
     ResolveRow resolve_row;
     const char *name;
@@ -389,30 +401,30 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
                    std::int8_t *faces);
-void accumulate_row(const Frame &frame, std::int32_t row, int);
-void filter_row(const Frame &frame, std::int32_t row, int pass);
+void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row);
+void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
 void find_taps(const Frame &frame, const Tile &tile);
-Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
+Rectangle resolve_row(const Frame &frame, std::int32_t row);
 } // namespace base
 namespace avx2 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
                    std::int8_t *faces);
-void accumulate_row(const Frame &frame, std::int32_t row, int);
-void filter_row(const Frame &frame, std::int32_t row, int pass);
+void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row);
+void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
 void find_taps(const Frame &frame, const Tile &tile);
-Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
+Rectangle resolve_row(const Frame &frame, std::int32_t row);
 } // namespace avx2
 namespace avx512 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
                    std::int8_t *faces);
-void accumulate_row(const Frame &frame, std::int32_t row, int);
-void filter_row(const Frame &frame, std::int32_t row, int pass);
+void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row);
+void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
 void find_taps(const Frame &frame, const Tile &tile);
-Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes);
+Rectangle resolve_row(const Frame &frame, std::int32_t row);
 } // namespace avx512
 
 } // namespace rt_embree

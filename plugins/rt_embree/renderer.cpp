@@ -142,7 +142,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     }
     if (settings.denoise && lights_ && !scene_.view().has_gloss &&
         setup.scene->objects.count <= Denoising::most_objects)
-        denoiser_.emplace(full_intrinsics_.width, full_intrinsics_.height, setup.scene->objects.count);
+        denoiser_.emplace(full_intrinsics_.width, full_intrinsics_.height, setup.scene->objects.count,
+                          lights_->casts_sharp_shadows());
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
     if (settings.accumulate)

@@ -20,20 +20,21 @@ ARHOST_INLINE Vec3 gather3(const float *const *rows, Int at) {
     return {gather(rows[0], at), gather(rows[1], at), gather(rows[2], at)};
 }
 
-// Index of a pixel in guides and light, and in histories.
-ARHOST_INLINE std::ptrdiff_t guide_at(const Denoising &denoising, int x, int y) {
-    return std::ptrdiff_t{y} * denoising.guide_stride() + Denoising::margin + x;
+// Index of a cell in guides and light, and in histories.
+ARHOST_INLINE std::ptrdiff_t guide_at(const Layer &layer, int x, int y) {
+    return std::ptrdiff_t{y} * layer.guide_stride() + Layer::margin + x;
 }
-ARHOST_INLINE std::ptrdiff_t history_at(const Denoising &denoising, int x, int y) {
-    return std::ptrdiff_t{y} * denoising.stride + x;
+ARHOST_INLINE std::ptrdiff_t history_at(const Layer &layer, int x, int y) {
+    return std::ptrdiff_t{y} * layer.stride + x;
 }
-ARHOST_INLINE Int surfaces_at(const Denoising &denoising, std::ptrdiff_t at) {
-    return bits_of(load(denoising.guides[surface_guide] + at));
+ARHOST_INLINE Int surfaces_at(const Layer &layer, std::ptrdiff_t at) {
+    return bits_of(load(layer.guides[surface_guide] + at));
 }
 
-// Returns the lanes whose surfaces have guides and light.
-ARHOST_INLINE Bool is_shaded(Int surface) {
-    return (surface != Int(0)) & (surface != Int(unchanged_surface));
+// Returns the lanes whose surfaces have light in the layer.
+ARHOST_INLINE Bool has_light_in(const Layer &layer, Int surface) {
+    const Bool is_real = is_kind(surface, real_surface);
+    return layer.of_catchers ? is_real & (surface != Int(unchanged_surface)) : ~is_real & (surface != Int(0));
 }
 
 // Normals with 10 bits per component.
@@ -50,73 +51,158 @@ ARHOST_INLINE Vec3 unpacked_normal(Int a) {
     return {value(a), value(a >> Int(10)), value(a >> Int(20))};
 }
 
-// Values of variance_light of light[0]: whether the light of a pixel was sampled in this frame. A pixel of a catcher
-// that was not has the light of the pixel of its 2×2 that was, if both show the same surface, else 0.
-constexpr float not_sampled = 0, borrowed = 0.5f, sampled = 1;
+// Values of variance_light of light[0]: whether the light of a cell was sampled in this frame.
+constexpr float not_sampled = 0, sampled = 1;
+
+// The cells of a layer that a block of pixels covers.
+struct BlockCells {
+    std::ptrdiff_t first; // index of guides and light
+    int width, height;
+};
+ARHOST_INLINE BlockCells cells_of(const Layer &layer, int x, int y, int width, int height) {
+    const int side = layer.cell_px;
+    return {guide_at(layer, x / side, y / side), (width + side - 1) / side, (height + side - 1) / side};
+}
+// `values`: block / cell_px per row.
+ARHOST_INLINE void write_cells(const Layer &layer, const BlockCells &cells, float *plane, const void *values) {
+    const int per_row = block / layer.cell_px;
+    for (int row = 0; row < cells.height; ++row) {
+        float *to = plane + cells.first + row * layer.guide_stride();
+        const float *from = static_cast<const float *>(values) + per_row * row;
+        if (cells.width == block) // sizes that the compiler knows
+            __builtin_memcpy(to, from, 4 * block);
+        else if (cells.width == block / 2)
+            __builtin_memcpy(to, from, 2 * block);
+        else
+            __builtin_memcpy(to, from, 4 * cells.width);
+    }
+}
+ARHOST_INLINE void write_surface(const Layer &layer, const BlockCells &cells, int surface) {
+    alignas(64) int values[lanes];
+    store(values, Int(surface));
+    write_cells(layer, cells, layer.guides[surface_guide], values);
+}
 
 // Marks the pixels of a block as unchanged.
 ARHOST_INLINE void write_unchanged(const Frame &frame, int x, int y, int width, int height) {
+    for (const Layer *layer : {&frame.denoising->objects, &frame.denoising->catchers})
+        write_surface(*layer, cells_of(*layer, x, y, width, height), unchanged_surface);
+}
+
+// Writes the guides and the mean light of the catchers of a block. A cell shows the catcher of a pixel, if possible
+// of one that was sampled.
+ARHOST_INLINE void write_catchers(const Frame &frame, const Scratch &scratch, int first_pixel, Float scale, int x,
+                                  int y, int width, int height) {
     const Denoising &denoising = *frame.denoising;
-    const int values[block] = {unchanged_surface, unchanged_surface, unchanged_surface, unchanged_surface};
-    for (int row = 0; row < height; ++row)
-        __builtin_memcpy(denoising.guides[surface_guide] + guide_at(denoising, x, y + row), values, 4 * width);
+    const Layer &layer = denoising.catchers;
+    const BlockCells cells = cells_of(layer, x, y, width, height);
+    const int phase = denoising.catcher_phase;
+    const float *surfaces = scratch.guide[surface_guide] + first_pixel;
+    const unsigned caught = mask_of(is_kind(bits_of(load(surfaces)), real_surface).lane);
+    if (caught == 0)
+        return write_surface(layer, cells, 0);
+    alignas(64) float values[lanes];
+    const auto write = [&](float *plane, Float row) __attribute__((always_inline)) {
+        store(values, row);
+        write_cells(layer, cells, plane, values);
+    };
+    if (layer.cell_px == 1) {
+        const Int all = bits_of(load(surfaces));
+        const Bool is_real = is_kind(all, real_surface);
+        for (int i = 0; i < albedo_guide; ++i)
+            write(layer.guides[i], load(scratch.guide[i] + first_pixel));
+        write(layer.guides[surface_guide], float_of(select(is_real, all, Int(0))));
+        for (int i = 0; i < 3; ++i) {
+            const Float change = load(scratch.sum[change_row + i] + first_pixel) * scale;
+            write(layer.light[0][i], select(is_real, change, Float(0.0f)));
+        }
+        const Bool is_sampled = (phase_of_lanes() == Int(phase)) | bool_of(phase < 0);
+        return write(layer.light[0][variance_light], select(is_sampled, Float(sampled), Float(not_sampled)));
+    }
+    constexpr int cell_count = 4;
+    const auto pixel_of = [](int cell, int i) __attribute__((always_inline)) {
+        return 2 * block * (cell >> 1) + 2 * (cell & 1) + block * (i >> 1) + (i & 1);
+    };
+    alignas(64) int shown[lanes] = {}, is_empty[lanes] = {}, pixels[4][lanes] = {};
+    for (int cell = 0; cell < cell_count; ++cell) {
+        is_empty[cell] = -1;
+        for (int i = 0; i < 4; ++i) {
+            const int pixel = pixel_of(cell, i);
+            pixels[i][cell] = pixel;
+            if ((caught >> pixel & 1) != 0 && (is_empty[cell] != 0 || i == phase)) {
+                shown[cell] = pixel;
+                is_empty[cell] = 0;
+            }
+        }
+    }
+    const Bool exists = load(is_empty) == Int(0);
+    const Int pixel = load(shown), surface = select(exists, bits_of(pick(surfaces, pixel)), Int(0));
+    for (int i = 0; i < albedo_guide; ++i)
+        write(layer.guides[i], pick(scratch.guide[i] + first_pixel, pixel));
+    write(layer.guides[surface_guide], float_of(surface));
+    Vec3 light = black();
+    Float count(0.0f);
+    for (int i = 0; i < 4; ++i) {
+        if (phase >= 0 && i != phase)
+            continue;
+        const Int of = load(pixels[i]);
+        const Bool counts = exists & (bits_of(pick(surfaces, of)) == surface);
+        const auto change = [&](int row) __attribute__((always_inline)) {
+            return select(counts, pick(scratch.sum[change_row + row] + first_pixel, of), Float(0.0f));
+        };
+        light = light + Vec3{change(0), change(1), change(2)};
+        count = count + select(counts, Float(1.0f), Float(0.0f));
+    }
+    light = light * (scale / max(count, Float(1.0f)));
+    write(layer.light[0][0], light.x);
+    write(layer.light[0][1], light.y);
+    write(layer.light[0][2], light.z);
+    write(layer.light[0][variance_light], select(count > Float(0.0f), Float(sampled), Float(not_sampled)));
 }
 
 // Writes the guides and the light of a block. `count`: the number of samples.
 ARHOST_INLINE void write_for_denoiser(const Frame &frame, const Scratch &scratch, int first_pixel,
                                       std::uint32_t count, int x, int y, int width, int height) {
     const Denoising &denoising = *frame.denoising;
+    const Layer &layer = denoising.objects;
     const Float scale(1.0f / static_cast<float>(count));
+    if (frame.scene.has_catchers)
+        write_catchers(frame, scratch, first_pixel, scale, x, y, width, height);
+    const BlockCells cells = cells_of(layer, x, y, width, height);
     const auto guide = [&](int row) __attribute__((always_inline)) {
         return load(scratch.guide[row] + first_pixel);
     };
-    const auto write = [&](float *plane, const float *values) __attribute__((always_inline)) {
-        for (int row = 0; row < height; ++row)
-            __builtin_memcpy(plane + guide_at(denoising, x, y + row), values + block * row, 4 * width);
-    };
-    alignas(64) float values[lanes], lender[lanes];
     const Int surface = bits_of(guide(surface_guide));
-    Float source(sampled);
-    Int lane = lane_numbers();
-    if (const int phase = denoising.catcher_phase; phase >= 0) {
-        const Bool is_catcher = is_kind(surface, real_surface);
-        const Int chosen = (lane_numbers() & Int(~5)) | Int((phase & 1) | (phase & 2) << 1);
-        store(lender, float_of(surface));
-        const Bool lends = bits_of(pick(lender, chosen)) == surface;
-        source = select(is_catcher & (chosen != lane), select(lends, Float(borrowed), Float(not_sampled)), source);
-        lane = select(is_catcher & lends, chosen, lane);
-    }
-    const Bool is_virtual = load(scratch.sum[coverage_row] + first_pixel) > Float(0.0f);
+    write_cells(layer, cells, layer.guides[surface_guide], scratch.guide[surface_guide] + first_pixel);
+    if (!any(surface != Int(denoising.flat_surface)))
+        return;
+    for (int i = 0; i < surface_guide; ++i)
+        write_cells(layer, cells, layer.guides[i], scratch.guide[i] + first_pixel);
+    alignas(64) float values[lanes];
+    const Bool is_virtual = has_light_in(layer, surface);
     for (int i = 0; i < 3; ++i) {
-        const Float radiance = load(scratch.sum[light_row + i] + first_pixel) / guide(albedo_guide + i);
-        Float change(0.0f);
-        if (frame.scene.has_catchers) {
-            store(lender, load(scratch.sum[change_row + i] + first_pixel));
-            change = pick(lender, lane);
-        }
-        store(values, select(is_virtual, radiance, change) * scale);
-        write(denoising.light[0][i], values);
+        const Float light = load(scratch.sum[light_row + i] + first_pixel) / guide(albedo_guide + i) * scale;
+        store(values, select(is_virtual, light, Float(0.0f)));
+        write_cells(layer, cells, layer.light[0][i], values);
     }
-    store(values, source);
-    write(denoising.light[0][variance_light], values);
-    for (int i = 0; i < guide_rows; ++i)
-        write(denoising.guides[i], scratch.guide[i] + first_pixel);
+    store(values, Float(sampled));
+    write_cells(layer, cells, layer.light[0][variance_light], values);
 }
 
-// The pixel of the previous frame that shows a point.
-struct Reprojected {
-    Float x, y;     // px
+// The pixel of an image that shows a point.
+struct Projected {
+    Float x, y;     // px, pixel centres at integers
     Float distance; // mm, from the camera
-    Bool inside;
+    Bool inside;    // in front of the camera
 };
-ARHOST_INLINE Reprojected reprojected(const Frame &frame, Vec3 position) {
-    const Denoising &denoising = *frame.denoising;
-    const Vec3 to_point = position - splat(denoising.camera_before.eye);
-    const PixelOf pixel = pixel_towards(frame.path.video, denoising.camera_before, to_point);
+ARHOST_INLINE Projected projected(const Frame &frame, const Camera &camera, Vec3 position) {
+    const Vec3 to_point = position - splat(camera.eye);
+    const PixelOf pixel = pixel_towards(frame.path.video, camera, to_point);
     // From texels of the video to pixels of the image.
     const Texture &video = frame.path.video.image;
-    const float across = static_cast<float>(denoising.width) / static_cast<float>(video.width),
-                down = static_cast<float>(denoising.height) / static_cast<float>(video.height);
+    const Layer &pixels = frame.denoising->objects;
+    const float across = static_cast<float>(pixels.width) / static_cast<float>(video.width),
+                down = static_cast<float>(pixels.height) / static_cast<float>(video.height);
     return {pixel.x * Float(across) - Float(0.5f), pixel.y * Float(down) - Float(0.5f), length(to_point),
             pixel.in_front};
 }
@@ -126,11 +212,17 @@ struct Past {
     Vec3 light;
     Float moments[2], frames; // frames: 0 if the surface is new
 };
-ARHOST_INLINE Past past_of(const Frame &frame, Vec3 position, Vec3 normal, Int surface, Bool active) {
+// `x`, `row`: of the first cell.
+ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int row, Vec3 position, Vec3 normal,
+                           Int surface, Bool active) {
     const Denoising &denoising = *frame.denoising;
     Past past{black(), {Float(0.0f), Float(0.0f)}, Float(0.0f)};
-    if (!denoising.before[0])
+    if (!layer.before[0])
         return past;
+    // The point may be in any pixel of its cell. The cell moves as that point does.
+    Projected now{};
+    if (layer.cell_px > 1)
+        now = projected(frame, frame.camera, position);
     if (denoising.before_from_now) {
         const Int first = object_of_surface(surface) * Int(12);
         const auto column = [&](int i) __attribute__((always_inline)) {
@@ -142,25 +234,30 @@ ARHOST_INLINE Past past_of(const Frame &frame, Vec3 position, Vec3 normal, Int s
         position = columns[0] * position.x + columns[1] * position.y + columns[2] * position.z + columns[3];
         normal = columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z;
     }
-    const Reprojected at = reprojected(frame, position);
+    Projected at = projected(frame, denoising.camera_before, position);
+    if (layer.cell_px > 1) {
+        const Float per_pixel(1.0f / static_cast<float>(layer.cell_px));
+        at.x = to_float(lane_numbers() + Int(x)) + (at.x - now.x) * per_pixel;
+        at.y = Float(static_cast<float>(row)) + (at.y - now.y) * per_pixel;
+    }
     const Float left = floor(max(min(at.x + Float(1.0f / 64), Float(1e6f)), Float(-2.0f))),
                 top = floor(max(min(at.y + Float(1.0f / 64), Float(1e6f)), Float(-2.0f)));
     const Float along = max(at.x - left, Float(0.0f)), down = max(at.y - top, Float(0.0f));
     Float total(0.0f);
     for (int i = 0; i < 4; ++i) {
-        const Int x = to_int(left) + Int(i & 1), y = to_int(top) + Int(i >> 1);
+        const Int column = to_int(left) + Int(i & 1), line = to_int(top) + Int(i >> 1);
         const Float weight = (i & 1 ? along : Float(1.0f) - along) * (i >> 1 ? down : Float(1.0f) - down);
-        Bool here = active & at.inside & (Int(-1) < x) & (x < Int(denoising.width)) & (Int(-1) < y) &
-                    (y < Int(denoising.height)) & (weight > Float(0.01f));
-        const Int pixel = select(here, y * Int(denoising.stride) + x, Int(0));
-        here = here & (bits_of(gather(denoising.before[surface_history], pixel)) == surface) &
-               (abs(gather(denoising.before[distance_history], pixel) - at.distance) < at.distance * Float(0.03f)) &
-               (dot(unpacked_normal(bits_of(gather(denoising.before[normal_history], pixel))), normal) > Float(0.8f));
+        Bool here = active & at.inside & (Int(-1) < column) & (column < Int(layer.width)) & (Int(-1) < line) &
+                    (line < Int(layer.height)) & (weight > Float(0.01f));
+        const Int cell = select(here, line * Int(layer.stride) + column, Int(0));
+        here = here & (bits_of(gather(layer.before[surface_history], cell)) == surface) &
+               (abs(gather(layer.before[distance_history], cell) - at.distance) < at.distance * Float(0.03f)) &
+               (dot(unpacked_normal(bits_of(gather(layer.before[normal_history], cell))), normal) > Float(0.8f));
         if (!any(here))
             continue;
         const Float share = select(here, weight, Float(0.0f));
-        const auto add = [&](Float & sum, int row) __attribute__((always_inline)) {
-            sum = sum + select(here, gather(denoising.before[row], pixel), Float(0.0f)) * share;
+        const auto add = [&](Float & sum, int of) __attribute__((always_inline)) {
+            sum = sum + select(here, gather(layer.before[of], cell), Float(0.0f)) * share;
         };
         add(past.light.x, 0);
         add(past.light.y, 1);
@@ -178,33 +275,25 @@ ARHOST_INLINE Past past_of(const Frame &frame, Vec3 position, Vec3 normal, Int s
     return past;
 }
 
-// Returns the largest luminance that a pixel may have: somewhat more than that of its neighbours, which are `apart`
-// pixels away. Infinite if there are too few of them.
-ARHOST_INLINE Float limit_by_neighbours(const Denoising &denoising, std::ptrdiff_t at, int row, Int surface,
-                                        int apart) {
+// Returns the light of a row's cells without fireflies: single paths that find a small bright light would remain
+// visible for many frames. So light may be only somewhat brighter than that of the cells around, if there are enough
+// of the same surface.
+ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, const Layer &layer, std::ptrdiff_t at, int row,
+                                           Int surface) {
+    // The nearest cells that were sampled, too.
+    const int apart = layer.of_catchers && layer.cell_px == 1 && denoising.catcher_phase >= 0 ? 2 : 1;
     Float brightest(0.0f), count(0.0f);
     for (int dy = -apart; dy <= apart; dy += apart)
         for (int dx = -apart; dx <= apart; dx += apart) {
-            if ((dx == 0 && dy == 0) || row + dy < 0 || row + dy >= denoising.height)
+            if ((dx == 0 && dy == 0) || row + dy < 0 || row + dy >= layer.height)
                 continue;
-            const std::ptrdiff_t there = at + dy * denoising.guide_stride() + dx;
-            const Bool same = surfaces_at(denoising, there) == surface;
-            brightest = max(brightest, select(same, luminance(load3(denoising.light[0], there)), Float(0.0f)));
+            const std::ptrdiff_t there = at + dy * layer.guide_stride() + dx;
+            const Bool same = surfaces_at(layer, there) == surface;
+            brightest = max(brightest, select(same, luminance(load3(layer.light[0], there)), Float(0.0f)));
             count = count + select(same, Float(1.0f), Float(0.0f));
         }
-    return select(count < Float(3.0f), Float(far_away), brightest * Float(4.0f) + Float(0.1f));
-}
-
-// Returns the light of a row's pixels without fireflies: single paths that find a small bright light would remain
-// visible for many frames.
-ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, std::ptrdiff_t at, int row, Int surface) {
-    const Bool borrows = is_kind(surface, real_surface) & bool_of(denoising.catcher_phase >= 0);
-    Float limit(far_away);
-    if (any(~borrows))
-        limit = limit_by_neighbours(denoising, at, row, surface, 1);
-    if (any(borrows)) // nearer pixels may have the same light
-        limit = select(borrows, limit_by_neighbours(denoising, at, row, surface, 2), limit);
-    const Vec3 light = load3(denoising.light[0], at);
+    const Float limit = select(count < Float(3.0f), Float(far_away), brightest * Float(4.0f) + Float(0.1f));
+    const Vec3 light = load3(layer.light[0], at);
     const Float value = luminance(light);
     return light * select(value > limit, limit / max(value, Float(1e-6f)), Float(1.0f));
 }
@@ -213,24 +302,22 @@ ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, std::ptrd
 constexpr float unknown = -1, no_light = -2;
 
 // Accumulates a row: means over frames. The filter reads them from light[1]; the variance is that of the mean.
-ARHOST_INLINE void accumulate(const Frame &frame, std::int32_t row) {
+ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32_t row) {
     const Denoising &denoising = *frame.denoising;
-    for (std::int32_t x = 0; x < denoising.width; x += lanes) {
-        const std::ptrdiff_t at = guide_at(denoising, x, row), kept = history_at(denoising, x, row);
-        const Int surface = surfaces_at(denoising, at);
-        const Bool active = is_shaded(surface);
+    for (std::int32_t x = 0; x < layer.width; x += lanes) {
+        const std::ptrdiff_t at = guide_at(layer, x, row), kept = history_at(layer, x, row);
+        const Int surface = surfaces_at(layer, at);
+        const Bool active = has_light_in(layer, surface);
         if (!any(active)) {
-            for (float *to : denoising.after)
+            for (float *to : layer.after)
                 store(to + kept, Float(0.0f));
             continue;
         }
-        const float *const *guides = denoising.guides;
+        const float *const *guides = layer.guides;
         const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
-        const Vec3 light = light_without_fireflies(denoising, at, row, surface);
-        const Past past = past_of(frame, position, normal, surface, active);
-        const Float source = load(denoising.light[0][variance_light] + at);
-        // Light of another pixel is only used where nothing better is known.
-        const Bool is_new = (source == Float(sampled)) | ((source == Float(borrowed)) & (past.frames < Float(1.0f)));
+        const Vec3 light = light_without_fireflies(denoising, layer, at, row, surface);
+        const Past past = past_of(frame, layer, x, row, position, normal, surface, active);
+        const Bool is_new = load(layer.light[0][variance_light] + at) == Float(sampled);
         Float most(denoising.most_frames);
         // The surroundings have no noise in mirrors and glass.
         const Bool shows_surroundings = is_kind(surface, specular_surface) & (surface < Int(mirrored_unit));
@@ -251,30 +338,30 @@ ARHOST_INLINE void accumulate(const Frame &frame, std::int32_t row) {
         Float variance = max(second - first * first, Float(0.0f)) / max(frames, Float(1.0f));
         variance = select(frames < Float(8.0f), select(shows_surroundings, Float(0.0f), Float(unknown)), variance);
         variance = select(frames > Float(0.0f), variance, Float(no_light));
-        store3(denoising.after, kept, select(active, mean, black()));
-        store(denoising.after[moment_history] + kept, select(active, first, Float(0.0f)));
-        store(denoising.after[moment_history + 1] + kept, select(active, second, Float(0.0f)));
-        store(denoising.after[distance_history] + kept,
+        store3(layer.after, kept, select(active, mean, black()));
+        store(layer.after[moment_history] + kept, select(active, first, Float(0.0f)));
+        store(layer.after[moment_history + 1] + kept, select(active, second, Float(0.0f)));
+        store(layer.after[distance_history] + kept,
               select(active, length(position - splat(frame.camera.eye)), Float(0.0f)));
-        store(denoising.after[normal_history] + kept, float_of(select(active, packed_normal(normal), Int(0))));
-        store(denoising.after[surface_history] + kept, float_of(select(active, surface, Int(0))));
-        store(denoising.after[frames_history] + kept, frames);
-        store3(denoising.light[1], at, select(active, mean, black()));
-        store(denoising.light[1][variance_light] + at, select(active, variance, Float(0.0f)));
+        store(layer.after[normal_history] + kept, float_of(select(active, packed_normal(normal), Int(0))));
+        store(layer.after[surface_history] + kept, float_of(select(active, surface, Int(0))));
+        store(layer.after[frames_history] + kept, frames);
+        store3(layer.light[1], at, select(active, mean, black()));
+        store(layer.light[1][variance_light] + at, select(active, variance, Float(0.0f)));
     }
 }
 
-// Returns the variance of the light near pixels whose history is too short to tell it, from their neighbours.
-ARHOST_INLINE Float variance_of_neighbours(const Denoising &denoising, const float *const *light, std::ptrdiff_t at,
-                                           int row, Int surface) {
+// Returns the variance of the light near cells whose history is too short to tell it, from their neighbours.
+ARHOST_INLINE Float variance_of_neighbours(const Layer &layer, const float *const *light, std::ptrdiff_t at, int row,
+                                           Int surface) {
     Float count(0.0f), first(0.0f), second(0.0f);
     for (int dy = -2; dy <= 2; ++dy) {
-        if (row + dy < 0 || row + dy >= denoising.height)
+        if (row + dy < 0 || row + dy >= layer.height)
             continue;
         for (int dx = -2; dx <= 2; ++dx) {
-            const std::ptrdiff_t there = at + dy * denoising.guide_stride() + dx;
+            const std::ptrdiff_t there = at + dy * layer.guide_stride() + dx;
             const Bool same =
-                (surfaces_at(denoising, there) == surface) & (load(light[variance_light] + there) > Float(no_light));
+                (surfaces_at(layer, there) == surface) & (load(light[variance_light] + there) > Float(no_light));
             const Float value = luminance(load3(light, there));
             count = count + select(same, Float(1.0f), Float(0.0f));
             first = first + select(same, value, Float(0.0f));
@@ -289,18 +376,18 @@ ARHOST_INLINE Float variance_of_neighbours(const Denoising &denoising, const flo
 // Differences of the luminance below about half a code are filtered, however certain.
 constexpr float least_variance = 1e-6f;
 
-// Filters a row: a pass of the à-trous filter with 3×3 taps, 2^pass pixels apart.
-ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
+// Filters a row: a pass of the à-trous filter with 3×3 taps, 2^pass cells apart.
+ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t row, int pass) {
     const Denoising &denoising = *frame.denoising;
     const int step = 1 << pass;
-    const float *const *from = denoising.light[(pass + 1) & 1];
-    float *const *to = denoising.light[pass & 1];
-    const float *const *guides = denoising.guides;
-    const std::ptrdiff_t down = denoising.guide_stride();
-    for (std::int32_t x = 0; x < denoising.width; x += lanes) {
-        const std::ptrdiff_t at = guide_at(denoising, x, row);
-        const Int surface = surfaces_at(denoising, at);
-        if (!any(is_shaded(surface)))
+    const float *const *from = layer.light[(pass + 1) & 1];
+    float *const *to = layer.light[pass & 1];
+    const float *const *guides = layer.guides;
+    const std::ptrdiff_t down = layer.guide_stride();
+    for (std::int32_t x = 0; x < layer.width; x += lanes) {
+        const std::ptrdiff_t at = guide_at(layer, x, row);
+        const Int surface = surfaces_at(layer, at);
+        if (!any(has_light_in(layer, surface)))
             continue;
         const bool flat = !any(surface != Int(denoising.flat_surface)); // needs no test of positions and normals
         const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
@@ -309,14 +396,15 @@ ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
         Float variance = load(from[variance_light] + at);
         if (pass == 0)
             if (const Bool needed = variance == Float(unknown); any(needed))
-                variance = select(needed, variance_of_neighbours(denoising, from, at, row, surface), variance);
+                variance = select(needed, variance_of_neighbours(layer, from, at, row, surface), variance);
         const Bool has_light = variance > Float(no_light);
         // Surfaces are flat within the width of a tap, up to about twice the size of a pixel.
         // In curved mirrors they are not.
         const Float distance = length(position - splat(frame.camera.eye)) *
                                select(is_kind(surface, specular_surface), Float(8.0f), Float(1.0f));
         const Float inverse_tolerance =
-            Float(1.0f) / (distance * Float(2.0f * static_cast<float>(step) * denoising.pixel_angle) + Float(1e-6f));
+            Float(1.0f) / (distance * Float(2.0f * static_cast<float>(step * layer.cell_px) * denoising.pixel_angle) +
+                           Float(1e-6f));
         // Guides do not have all edges of the picture in curved mirrors and glass.
         const Float tolerated = select(is_kind(surface, specular_surface), Float(9.0f), Float(36.0f));
         // The jittered samples of a moving mirror are too few to smooth what it shows.
@@ -331,14 +419,14 @@ ARHOST_INLINE void filter(const Frame &frame, std::int32_t row, int pass) {
         Vec3 sum = light * own_weight;
         Float total = own_weight, squares = least * own_weight * own_weight;
         for (int dy = -1; dy <= 1; ++dy) {
-            if (row + dy * step < 0 || row + dy * step >= denoising.height)
+            if (row + dy * step < 0 || row + dy * step >= layer.height)
                 continue;
             for (int dx = -1; dx <= 1; ++dx) {
                 if (dx == 0 && dy == 0)
                     continue;
                 const std::ptrdiff_t there = at + dy * step * down + dx * step;
                 const Float of_other = load(from[variance_light] + there);
-                const Int surface_there = surfaces_at(denoising, there);
+                const Int surface_there = surfaces_at(layer, there);
                 Bool same = surface_there == surface, in_mirror = bool_of(false);
                 if (pass == 0 && any_specular) {
                     in_mirror = specular & (((surface_there ^ surface) & Int(mirrored_unit - 1)) == Int(0));
@@ -390,18 +478,19 @@ constexpr unsigned only_own = 0x44444444;
 // Returns the pixels of a row that differ from a neighbour.
 ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
     const Denoising &denoising = *frame.denoising;
-    const float *const *guides = denoising.guides;
-    const std::ptrdiff_t at = guide_at(denoising, x, y), down = denoising.guide_stride();
+    const Layer &layer = denoising.objects;
+    const float *const *guides = layer.guides;
+    const std::ptrdiff_t at = guide_at(layer, x, y), down = layer.guide_stride();
     const auto flat_if_unchanged = [&](Int surface) __attribute__((always_inline)) {
         return select(surface == Int(unchanged_surface), Int(denoising.flat_surface), surface);
     };
-    const Int surface = flat_if_unchanged(surfaces_at(denoising, at));
+    const Int surface = flat_if_unchanged(surfaces_at(layer, at));
     Bool differs = surface != Int(denoising.flat_surface);
     if (!any(differs)) {
         for (int dy = -1; dy <= 1; ++dy)
             for (int dx = -1; dx <= 1; ++dx)
-                if ((dx == 0) != (dy == 0) && y + dy >= 0 && y + dy < denoising.height)
-                    differs = differs | (flat_if_unchanged(surfaces_at(denoising, at + dy * down + dx)) != surface);
+                if ((dx == 0) != (dy == 0) && y + dy >= 0 && y + dy < layer.height)
+                    differs = differs | (flat_if_unchanged(surfaces_at(layer, at + dy * down + dx)) != surface);
         if (!any(differs))
             return differs;
     }
@@ -410,19 +499,19 @@ ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
     Bool edge = bool_of(false);
     for (int i = 0; i < 4; ++i) {
         const int dx = i == 0 ? -1 : i == 1 ? 1 : 0, dy = i == 2 ? -1 : i == 3 ? 1 : 0;
-        if (y + dy < 0 || y + dy >= denoising.height)
+        if (y + dy < 0 || y + dy >= layer.height)
             continue;
         const std::ptrdiff_t there = at + dy * down + dx;
-        const Int other = flat_if_unchanged(surfaces_at(denoising, there));
+        const Int other = flat_if_unchanged(surfaces_at(layer, there));
         const Bool inside = Int(-1) < (lane_numbers() + Int(x + dx));
-        const Bool right = (lane_numbers() + Int(x + dx)) < Int(denoising.width);
+        const Bool right = (lane_numbers() + Int(x + dx)) < Int(layer.width);
         const Bool folded = (other != Int(0)) & ~is_kind(surface, specular_surface) &
                             (surface != Int(denoising.flat_surface)) &
                             ((dot(load3(guides + normal_guide, there), normal) < Float(0.8f)) |
                              (abs(dot(load3(guides + position_guide, there) - position, normal)) > tolerance));
         edge = edge | (inside & right & ((((other ^ surface) & Int(mirrored_unit - 1)) != Int(0)) | folded));
     }
-    return edge & ((lane_numbers() + Int(x)) < Int(denoising.width));
+    return edge & ((lane_numbers() + Int(x)) < Int(layer.width));
 }
 
 // A pixel at an edge, and its ray in Rays::blocks.
@@ -434,6 +523,7 @@ struct EdgePixel {
 // Finds the taps of two pixels. Lanes are their rays.
 ARHOST_INLINE void find_taps_of(const Frame &frame, const EdgePixel &one, const EdgePixel &other) {
     const Denoising &denoising = *frame.denoising;
+    const Layer &layer = denoising.objects;
     const Bool is_one = lane_numbers() < Int(tap_count);
     const auto row = [&](int i) __attribute__((always_inline)) {
         return select(is_one, Float(one.ray[lanes * i]), Float(other.ray[lanes * i]));
@@ -464,20 +554,21 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const EdgePixel &one, const 
         far = select(hits.caught, load(hits.catcher_rays.ray.tfar), far);
     }
     const Vec3 position = splat(frame.camera.eye) + direction * far;
-    const float *const *guides = denoising.guides;
+    const float *const *guides = layer.guides;
     Int chosen = select(surface == Int(0), Int(no_tap), Int(own_tap));
     Float least(1e30f);
     for (int tap = 0; tap < 9; ++tap) {
         const int dx = tap % 3 - 1, dy = tap / 3 - 1;
-        const bool inside[] = {one.y + dy >= 0 && one.y + dy < denoising.height,
-                               other.y + dy >= 0 && other.y + dy < denoising.height};
-        const std::ptrdiff_t at[] = {guide_at(denoising, one.x + dx, inside[0] ? one.y + dy : one.y),
-                                     guide_at(denoising, other.x + dx, inside[1] ? other.y + dy : other.y)};
+        const bool inside[] = {one.y + dy >= 0 && one.y + dy < layer.height,
+                               other.y + dy >= 0 && other.y + dy < layer.height};
+        const std::ptrdiff_t at[] = {guide_at(layer, one.x + dx, inside[0] ? one.y + dy : one.y),
+                                     guide_at(layer, other.x + dx, inside[1] ? other.y + dy : other.y)};
         const auto surface_there = [&](int i) __attribute__((always_inline)) {
             return Int(inside[i] ? __builtin_bit_cast(int, guides[surface_guide][at[i]]) : 0);
         };
         const Int number = select(is_one, surface_there(0), surface_there(1)) & Int(mirrored_unit - 1);
-        const Bool flat = (number == Int(unchanged_surface)) & (surface == Int(denoising.flat_surface));
+        const Bool flat =
+            (surface == Int(denoising.flat_surface)) & ((number == surface) | (number == Int(unchanged_surface)));
         const Bool same = (flat | (number == surface)) & (surface != Int(0));
         if (!any(same))
             continue;
@@ -489,7 +580,7 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const EdgePixel &one, const 
         };
         const Float from_plane = abs(dot(vector(normal_guide), vector(position_guide) - position));
         const Float apart = select(flat | is_kind(surface, specular_surface), Float(0.0f), from_plane) +
-                            Float(tap == own_tap ? 0.0f : 1e-3f) * far;
+                            Float(tap == own_tap ? 0.0f : 0.05f * denoising.pixel_angle) * far;
         const Bool nearer = same & (apart < least);
         least = select(nearer, apart, least);
         chosen = select(nearer, Int(tap), chosen);
@@ -499,19 +590,20 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const EdgePixel &one, const 
     unsigned taps[2] = {};
     for (int i = 0; i < lanes; ++i)
         taps[i / tap_count] |= static_cast<unsigned>(values[i]) << 4 * (i % tap_count);
-    denoising.taps[history_at(denoising, one.x, one.y)] = taps[0];
-    denoising.taps[history_at(denoising, other.x, other.y)] = taps[1];
+    denoising.taps[history_at(layer, one.x, one.y)] = taps[0];
+    denoising.taps[history_at(layer, other.x, other.y)] = taps[1];
 }
 
 // Finds the taps of the pixels of a tile.
 ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
     const Denoising &denoising = *frame.denoising;
+    const Layer &layer = denoising.objects;
     const Rectangle &all = tile.pixels;
     bool has_edges = false;
     for (int y = all.y0; y < all.y1; ++y)
         for (int x = all.x0; x < all.x1; x += lanes) {
             const Bool edges = edges_at(frame, x, y);
-            store(denoising.taps + history_at(denoising, x, y), select(edges, Int(0), Int(only_own)));
+            store(denoising.taps + history_at(layer, x, y), select(edges, Int(0), Int(only_own)));
             has_edges = has_edges || any(edges);
         }
     if (!has_edges)
@@ -522,7 +614,7 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
         for (int row = 0; row < height; ++row)
             for (int column = 0; column < width; ++column) {
                 const int x = x0 + column, y = y0 + row;
-                if (denoising.taps[history_at(denoising, x, y)] == only_own)
+                if (denoising.taps[history_at(layer, x, y)] == only_own)
                     continue;
                 const EdgePixel pixel{x, y, rays + number * frame.rays.block_size() + block * row + column};
                 if (waiting.ray)
@@ -552,31 +644,98 @@ ARHOST_INLINE void write_untouched(const Frame &frame, int x, int row, int width
             __builtin_memcpy(to, four, 16 * (width - column));
 }
 
-// Writes a row of the image. `passes`: of the filter.
-ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row, int passes) {
-    const Denoising &denoising = *frame.denoising;
-    const float *const *from = denoising.light[(passes + 1) & 1];
-    const float *const *guides = denoising.guides;
-    Rectangle drawn{denoising.width, row, 0, row + 1};
-    for (std::int32_t x = 0; x < denoising.width; x += lanes) {
-        const int width = denoising.width - x < lanes ? denoising.width - x : lanes;
-        const Int taps = load(denoising.taps + history_at(denoising, x, row));
-        LinearBlock linear{black(), black()};
-        const auto add = [&](Int surface, Vec3 light, Vec3 albedo, Float share, Bool here)
-            __attribute__((always_inline)) {
-            const Bool is_virtual = here & (surface != Int(0)) & ~is_kind(surface, real_surface);
-            linear.added = linear.added + select(is_virtual, light * albedo * share, black());
-            linear.transmittance =
-                linear.transmittance +
-                select(here & ~is_virtual, (white() + select(is_shaded(surface), light, black())) * share, black());
+// The light of the catchers near the pixels of a row, interpolated between cells.
+class InterpolatedCatchers {
+public:
+    // `x`: even.
+    ARHOST_INLINE InterpolatedCatchers(const Frame &frame, int x, int row)
+        : layer_(frame.denoising->catchers), light_(layer_.light[(layer_.filter_passes() + 1) & 1]), x_(x),
+          row_(row) {}
+
+    // Returns the light of surfaces that the pixels, or those beside them, show.
+    ARHOST_INLINE Vec3 of(Int surface) const {
+        Sums sums{black(), black(), Float(0.0f), Float(0.0f)};
+        if (layer_.cell_px == 1) {
+            add(sums, guide_at(layer_, x_, row_), lane_numbers(), surface, Float(1.0f));
+            const Bool missing = sums.total == Float(0.0f); // their light is that of the pixels around
+            for (int i = 0; i < 9 && any(missing); ++i)
+                if (const int y = row_ + i / 3 - 1; y >= 0 && y < layer_.height)
+                    add(sums, guide_at(layer_, x_ + i % 3 - 1, y), lane_numbers(), surface,
+                        select(missing, Float(1.0f), Float(0.0f)));
+        } else {
+            const Int odd = lane_numbers() & Int(1), nearest = Int(1) + (lane_numbers() >> Int(1));
+            const int beside = row_ / 2 + (row_ % 2 == 0 ? -1 : 1);
+            for (int i = 0; i < 4; ++i) {
+                const int cell_row = i >> 1 && beside >= 0 && beside < layer_.height ? beside : row_ / 2;
+                const float weight = (i & 1 ? 0.25f : 0.75f) * (i >> 1 ? 0.25f : 0.75f);
+                add(sums, guide_at(layer_, x_ / 2 - 1, cell_row), i & 1 ? nearest - Int(1) + odd + odd : nearest,
+                    surface, Float(weight));
+            }
+        }
+        const Bool none = sums.total == Float(0.0f); // such as in a corner of two catchers
+        const Float total = max(select(none, sums.total_of_all, sums.total), Float(1e-6f));
+        return select(none, sums.of_all, sums.light) * (Float(1.0f) / total);
+    }
+
+private:
+    struct Sums {
+        Vec3 light, of_all; // of the surface, and of all catchers
+        Float total, total_of_all;
+    };
+    // Adds the light of cells, which are `cell` after the one at the index `first`.
+    ARHOST_INLINE void add(Sums &sums, std::ptrdiff_t first, Int cell, Int surface, Float weight) const {
+        const Int there = bits_of(pick(layer_.guides[surface_guide] + first, cell));
+        const Bool is_unchanged = there == Int(unchanged_surface);
+        const Bool known = is_unchanged | (is_kind(there, real_surface) &
+                                           (pick(light_[variance_light] + first, cell) > Float(no_light)));
+        if (!any(known))
+            return;
+        const auto channel = [&](int row) __attribute__((always_inline)) {
+            return select(known & ~is_unchanged, pick(light_[row] + first, cell), Float(0.0f)) * weight;
         };
-        const std::ptrdiff_t at = guide_at(denoising, x, row);
+        const Vec3 light{channel(0), channel(1), channel(2)};
+        const Bool same = known & (is_unchanged | (there == surface));
+        sums.light = sums.light + select(same, light, black());
+        sums.total = sums.total + select(same, weight, Float(0.0f));
+        sums.of_all = sums.of_all + select(known, light, black());
+        sums.total_of_all = sums.total_of_all + select(known, weight, Float(0.0f));
+    }
+
+    const Layer &layer_;
+    const float *const *light_;
+    int x_, row_;
+};
+
+// Writes a row of the image.
+ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
+    const Denoising &denoising = *frame.denoising;
+    const Layer &layer = denoising.objects;
+    const float *const *from = layer.light[(layer.filter_passes() + 1) & 1];
+    const float *const *guides = layer.guides;
+    Rectangle drawn{layer.width, row, 0, row + 1};
+    for (std::int32_t x = 0; x < layer.width; x += lanes) {
+        const int width = layer.width - x < lanes ? layer.width - x : lanes;
+        const Int taps = load(denoising.taps + history_at(layer, x, row));
+        const std::ptrdiff_t at = guide_at(layer, x, row);
+        const Int own_surface = surfaces_at(layer, at);
         const Bool plain = taps == Int(static_cast<int>(only_own));
-        if (!any(~plain | is_shaded(surfaces_at(denoising, at)))) {
+        if (!any(~plain | ((own_surface != Int(0)) & (own_surface != Int(unchanged_surface))))) {
             write_untouched(frame, x, row, width);
             continue;
         }
-        add(surfaces_at(denoising, at), load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
+        LinearBlock linear{black(), black()};
+        const InterpolatedCatchers catchers(frame, x, row);
+        // `light`, `albedo`: of virtual objects.
+        const auto add = [&](Int surface, Vec3 light, Vec3 albedo, Float share, Bool here)
+            __attribute__((always_inline)) {
+            const Bool is_virtual = here & has_light_in(layer, surface), is_real = here & ~is_virtual;
+            linear.added = linear.added + select(is_virtual, light * albedo * share, black());
+            Vec3 transmittance = white();
+            if (const Bool changed = is_real & has_light_in(denoising.catchers, surface); any(changed))
+                transmittance = transmittance + select(changed, catchers.of(surface), black());
+            linear.transmittance = linear.transmittance + select(is_real, transmittance * share, black());
+        };
+        add(own_surface, load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
         const Bool edges = ~plain & (lane_numbers() < Int(width));
         if (any(edges)) {
             for (int i = 0; i < tap_count; ++i) {
@@ -585,8 +744,8 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row, int passes
                           dx = tap - (dy + Int(1)) * Int(3) - Int(1);
                 const Bool here = edges & (tap != Int(no_tap));
                 const Int there =
-                    select(here, Int(static_cast<int>(at)) + lane_numbers() + dy * Int(denoising.guide_stride()) + dx,
-                           Int(Denoising::margin));
+                    select(here, Int(static_cast<int>(at)) + lane_numbers() + dy * Int(layer.guide_stride()) + dx,
+                           Int(Layer::margin));
                 const Int surface = select(here, bits_of(gather(guides[surface_guide], there)), Int(0));
                 add(surface, gather3(from, there), gather3(guides + albedo_guide, there), Float(1.0f / tap_count),
                     edges);

@@ -302,20 +302,20 @@ void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
         trace_photon_packet(frame, first + i, to + i, faces + i, lane_numbers() < Int(static_cast<int>(count - i)));
 }
 
-void accumulate_row(const Frame &frame, std::int32_t row, int) {
-    accumulate(frame, row);
+void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row) {
+    accumulate(frame, layer, row);
 }
 
-void filter_row(const Frame &frame, std::int32_t row, int pass) {
-    filter(frame, row, pass);
+void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass) {
+    filter(frame, layer, row, pass);
 }
 
 void find_taps(const Frame &frame, const Tile &tile) {
     find_taps_of(frame, tile);
 }
 
-Rectangle resolve_row(const Frame &frame, std::int32_t row, int passes) {
-    return resolve(frame, row, passes);
+Rectangle resolve_row(const Frame &frame, std::int32_t row) {
+    return resolve(frame, row);
 }
 
 } // namespace rt_embree::ARHOST_ISA

@@ -165,11 +165,14 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
         shade_path(work, rays, hit, next.paths);
 }
 
+// Returns the catcher_phase in which each pixel of a block is sampled.
+ARHOST_INLINE Int phase_of_lanes() {
+    return (lane_numbers() & Int(1)) | ((lane_numbers() >> Int(1)) & Int(2));
+}
+
 // Keeps the rays to the catchers that are sampled in this frame: one of each 2×2 pixels.
 ARHOST_INLINE void defer_catchers(Work &work, Vec3 direction, Int pixel, Bool caught) {
-    const int phase = work.frame.denoising->catcher_phase;
-    const Int odd = (lane_numbers() & Int(1)) | ((lane_numbers() >> Int(1)) & Int(2)); // column, row in 2×2 pixels
-    const Bool chosen = caught & (odd == Int(phase));
+    const Bool chosen = caught & (phase_of_lanes() == Int(work.frame.denoising->catcher_phase));
     alignas(64) float by_lane[DeferredCatchers::rows][lanes];
     const Float values[] = {direction.x, direction.y, direction.z, float_of(pixel)};
     for (int row = 0; row < DeferredCatchers::rows; ++row)
