@@ -137,7 +137,8 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     denoising_.flat_surface = flat_catcher < 0 ? 0 : surface_number(flat_catcher, real_surface);
     // The numbers of frames may have gaps, such as three of four.
     constexpr std::array<std::int32_t, 4> phases{0, 3, 1, 2};
-    denoising_.catcher_phase = phases[(header.first + header.frames) % 4];
+    denoising_.number = header.first + header.frames;
+    denoising_.catcher_phase = phases[denoising_.number % 4];
     denoising_.first_random_of_catchers = (header.first + header.frames / 4) * samples;
     const ObjectState *then = nullptr;
     if (before) {

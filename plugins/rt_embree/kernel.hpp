@@ -234,7 +234,8 @@ constexpr std::int32_t most_surfaces = 1 << 20;
 // PathScene::wide_catcher where virtual objects do not change it.
 constexpr std::int32_t unchanged_surface = most_surfaces - 4 + real_surface;
 
-// Of the surface that the ray through the centre of a pixel meets, for the denoiser.
+// Of the surface that the ray through the centre of a pixel meets, in a larger cell of one of its pixels, for the
+// denoiser.
 enum GuideRow : int {
     position_guide,                    // three rows: mm, in world axes
     normal_guide = position_guide + 3, // three rows: unit vector
@@ -246,11 +247,11 @@ enum GuideRow : int {
 
 // The denoised light of a surface: the radiance of a virtual one divided by its albedo, or the change of a catcher.
 enum LightRow : int {
-    variance_light = 3, // of the luminance of the three rows before
+    variance_light = 3, // of the luminance of the three rows before; at first, `sampled` or `not_sampled`
     light_rows
 };
 
-// The memory of the denoiser: one value per pixel.
+// The memory of the denoiser: one value per cell of a layer.
 enum HistoryRow : int {
     moment_history = 3, // two rows: means of the luminance of the light and of its square; the light precedes
     distance_history = moment_history + 2, // mm, from the camera to the surface
@@ -289,6 +290,7 @@ struct Denoising {
     std::int32_t flat_surface; // number of that of PathScene::wide_catcher; 0: there is none
     // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels.
     std::int32_t catcher_phase;
+    std::uint32_t number;                   // of the frame, without gaps
     std::uint32_t first_random_of_catchers; // as Frame::first_random
     // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
     // axes. NULL if no placement has changed.

@@ -181,7 +181,6 @@ void Renderer::set_size(const arhost_camera &camera) {
 
 void Renderer::place_lights() {
     lights_->place(scene_.placed_objects());
-    photon_sums_ = {};
     scene_.set_emitters(lights_->emitters());
     const auto spheres = lights_->specular_spheres();
     photon_targets_.set(scene_.arena(), {spheres.begin(), spheres.end()});
@@ -193,13 +192,15 @@ void Renderer::place_lights() {
 
 // Sends photons from the lamps to mirrors and glass. With denoising, frames take turns with a few sets of photons, so
 // that a scene at rest soon needs no new ones.
-void Renderer::trace_photons(Frame &frame, std::uint64_t sequence) {
+void Renderer::trace_photons(Frame &frame) {
     constexpr std::uint32_t chunk = 1 << 12;
     const std::uint32_t count = arhost::raytracer_common::photon_count(photons_per_sample_, frame.sample_count);
     if (photon_targets_.empty() || count == 0)
         return;
-    const std::size_t set = sequence % photon_sums_.size();
+    std::size_t set = 0;
     if (frame.denoising) {
+        // Larger sets need less variety, and more memory.
+        set = frame.denoising->number % std::clamp<std::size_t>((1u << 18) / count, 1, photon_sums_.size());
         if (count != std::exchange(photons_per_set_, count))
             photon_sums_ = {};
         if (photon_sums_[set]) {
@@ -230,7 +231,8 @@ void Renderer::trace_photons(Frame &frame, std::uint64_t sequence) {
     Photons &photons = frame.path.photons;
     if (frame.denoising) {
         // Light that is too weak to be seen is left out. Each set has its own grid, so that its steps are no edges of
-        // the picture.
+        // the picture: powers of the inverse of the root of x⁴ = x + 1 (the R3 sequence: M. Roberts, The Unreasonable
+        // Effectiveness of Quasirandom Sequences, 2018).
         const auto fraction = [&](double irrational) {
             const double at = static_cast<double>(set + 1) * irrational;
             return static_cast<float>(at - std::floor(at));
@@ -313,6 +315,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
     const Pose pose(camera);
     if (motion) {
+        photon_sums_ = {};
         scene_.move(*motion);
         if (lights_)
             place_lights();
@@ -369,7 +372,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (frame.denoising && finds_unchanged())
         frame.path.wide_catcher = windows.wide_catcher();
     if (lights_)
-        trace_photons(frame, sequence);
+        trace_photons(frame);
     const RenderTile render_tile = lights_ ? kernel_.render_path_tile : kernel_.render_tile;
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;

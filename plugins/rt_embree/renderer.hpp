@@ -70,7 +70,7 @@ private:
     void place_lights();
     PathScene path_scene() const;
     bool finds_unchanged() const;
-    void trace_photons(Frame &frame, std::uint64_t sequence);
+    void trace_photons(Frame &frame);
 
     arhost::Host host_;
     const arhost_intrinsics full_intrinsics_; // the intrinsics passed to start

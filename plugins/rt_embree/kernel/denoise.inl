@@ -89,8 +89,8 @@ ARHOST_INLINE void write_unchanged(const Frame &frame, int x, int y, int width, 
         write_surface(*layer, cells_of(*layer, x, y, width, height), unchanged_surface);
 }
 
-// Writes the guides and the mean light of the catchers of a block. A cell shows the catcher of a pixel, if possible
-// of one that was sampled.
+// Writes the guides and the mean light of the catchers of a block. A cell shows the catcher of its first pixel that
+// has one, so that it shows the same in each frame.
 ARHOST_INLINE void write_catchers(const Frame &frame, const Scratch &scratch, int first_pixel, Float scale, int x,
                                   int y, int width, int height) {
     const Denoising &denoising = *frame.denoising;
@@ -129,7 +129,7 @@ ARHOST_INLINE void write_catchers(const Frame &frame, const Scratch &scratch, in
         for (int i = 0; i < 4; ++i) {
             const int pixel = pixel_of(cell, i);
             pixels[i][cell] = pixel;
-            if ((caught >> pixel & 1) != 0 && (is_empty[cell] != 0 || i == phase)) {
+            if ((caught >> pixel & 1) != 0 && is_empty[cell] != 0) {
                 shown[cell] = pixel;
                 is_empty[cell] = 0;
             }
@@ -180,8 +180,9 @@ ARHOST_INLINE void write_for_denoiser(const Frame &frame, const Scratch &scratch
         write_cells(layer, cells, layer.guides[i], scratch.guide[i] + first_pixel);
     alignas(64) float values[lanes];
     const Bool is_virtual = has_light_in(layer, surface);
+    const Float samples = load(scratch.sum[coverage_row] + first_pixel); // more at edges in mirrors
     for (int i = 0; i < 3; ++i) {
-        const Float light = load(scratch.sum[light_row + i] + first_pixel) / guide(albedo_guide + i) * scale;
+        const Float light = load(scratch.sum[light_row + i] + first_pixel) / (guide(albedo_guide + i) * samples);
         store(values, select(is_virtual, light, Float(0.0f)));
         write_cells(layer, cells, layer.light[0][i], values);
     }
@@ -288,7 +289,8 @@ ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, const Lay
             if ((dx == 0 && dy == 0) || row + dy < 0 || row + dy >= layer.height)
                 continue;
             const std::ptrdiff_t there = at + dy * layer.guide_stride() + dx;
-            const Bool same = surfaces_at(layer, there) == surface;
+            const Bool same = (surfaces_at(layer, there) == surface) &
+                              (load(layer.light[0][variance_light] + there) == Float(sampled));
             brightest = max(brightest, select(same, luminance(load3(layer.light[0], there)), Float(0.0f)));
             count = count + select(same, Float(1.0f), Float(0.0f));
         }
@@ -649,8 +651,8 @@ class InterpolatedCatchers {
 public:
     // `x`: even.
     ARHOST_INLINE InterpolatedCatchers(const Frame &frame, int x, int row)
-        : layer_(frame.denoising->catchers), light_(layer_.light[(layer_.filter_passes() + 1) & 1]), x_(x),
-          row_(row) {}
+        : layer_(frame.denoising->catchers), light_(layer_.light[(layer_.filter_passes() + 1) & 1]),
+          flat_surface_(frame.denoising->flat_surface), x_(x), row_(row) {}
 
     // Returns the light of surfaces that the pixels, or those beside them, show.
     ARHOST_INLINE Vec3 of(Int surface) const {
@@ -694,7 +696,7 @@ private:
             return select(known & ~is_unchanged, pick(light_[row] + first, cell), Float(0.0f)) * weight;
         };
         const Vec3 light{channel(0), channel(1), channel(2)};
-        const Bool same = known & (is_unchanged | (there == surface));
+        const Bool same = known & ((is_unchanged & (surface == Int(flat_surface_))) | (there == surface));
         sums.light = sums.light + select(same, light, black());
         sums.total = sums.total + select(same, weight, Float(0.0f));
         sums.of_all = sums.of_all + select(known, light, black());
@@ -703,7 +705,7 @@ private:
 
     const Layer &layer_;
     const float *const *light_;
-    int x_, row_;
+    int flat_surface_, x_, row_;
 };
 
 // Writes a row of the image.

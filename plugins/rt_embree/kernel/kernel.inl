@@ -170,6 +170,7 @@ template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use
 
 #include "denoise.inl"
 #include "region.inl"
+#include "specular_edges.inl"
 
 struct Whitted {
     template <class DirectionAt>
@@ -269,6 +270,8 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
         if (!frame.goes_on(frame.progress))
             break;
     }
+    if (frame.denoising)
+        smooth_specular_edges(work, tile);
     const std::uint32_t count = frame.first_sample + static_cast<std::uint32_t>(frame.sample_count);
     for_each_block(all, [&](int number, int x, int y, int width, int height) {
         const int first_pixel = number * lanes;

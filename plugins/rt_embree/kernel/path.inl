@@ -223,6 +223,30 @@ ARHOST_INLINE void shade_specular(Work &work, const PrimaryHits &centre, const P
         shade_path(work, centre.rays, missed, paths);
 }
 
+ARHOST_INLINE void clear_radiance(Work &work, int first_pixel) {
+    const int planes_used = work.frame.scene.has_gloss ? plane_count : mirrored_plane;
+    for (float *planes : work.scratch.radiance)
+        for (int plane = 0; plane < planes_used; ++plane)
+            store(planes + plane * tile_pixels + first_pixel, Float(0.0f));
+}
+
+// Traces more rays through pixels that show mirrors and glass. Returns whether any of them meets the same object.
+// `direction`: through the pixels, away from their centres.
+ARHOST_INLINE bool shade_specular_again(Work &work, int first_pixel, Vec3 direction, Bool active) {
+    clear_radiance(work, first_pixel);
+    const Scene &scene = work.frame.scene;
+    const PrimaryHits hits = trace_primary(scene, splat(work.frame.camera.eye), direction, active, active);
+    if (!any(hits.is_virtual))
+        return false;
+    const Int surface = bits_of(load(work.scratch.guide[surface_guide] + first_pixel)) & Int(mirrored_unit - 1);
+    const Bool same = hits.is_virtual & (surface_of(scene, hits.rays.hit, hits.is_virtual) == surface);
+    if (!any(same))
+        return false;
+    add_to_sum(work.scratch, coverage_row, first_pixel, select(same, Float(1.0f), Float(0.0f)));
+    shade_path(work, hits.rays, same, {lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)});
+    return true;
+}
+
 // Traces the primary rays of a block and shades their hits. Returns whether any pixel can be affected.
 // `direction_at`: (x, y) px from the pixels' centres; `near`: see trace_primary().
 template <class DirectionAt>
@@ -230,10 +254,7 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Dir
                                 Bool near) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
-    const int planes_used = scene.has_gloss ? plane_count : mirrored_plane;
-    for (float *planes : work.scratch.radiance)
-        for (int plane = 0; plane < planes_used; ++plane)
-            store(planes + plane * tile_pixels + first_pixel, Float(0.0f));
+    clear_radiance(work, first_pixel);
     const PrimaryHits hits = trace_primary(scene, eye, direction, active, near);
     if (work.frame.denoising && work.index == 0)
         store_guides(work, hits, direction, first_pixel);

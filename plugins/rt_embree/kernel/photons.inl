@@ -281,7 +281,7 @@ struct PhotonLight {
 // signed cubes of their distances. A small area counts as a quarter, since surfaces may be curved.
 ARHOST_INLINE Float area_in_cell(Vec3 normal, Vec3 from_centre) {
     const auto component = [](Float a) __attribute__((always_inline)) {
-        return max(abs(a), Float(0.02f));
+        return max(abs(a), Float(0.005f));
     };
     const Vec3 n = normalize(Vec3{component(normal.x), component(normal.y), component(normal.z)});
     const Float height = abs(dot(from_centre, normal));
