@@ -409,14 +409,6 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
                            Float(1e-6f));
         // Guides do not have all edges of the picture in curved mirrors and glass.
         const Float tolerated = select(is_kind(surface, specular_surface), Float(9.0f), Float(36.0f));
-        // The jittered samples of a moving mirror are too few to smooth what it shows.
-        const Bool specular = is_kind(surface, specular_surface) & bool_of(denoising.camera_moved);
-        const bool any_specular = any(specular);
-        Vec3 inverse_albedo = white();
-        if (any_specular) {
-            const Vec3 albedo = select(specular, load3(guides + albedo_guide, at), white());
-            inverse_albedo = {Float(1.0f) / albedo.x, Float(1.0f) / albedo.y, Float(1.0f) / albedo.z};
-        }
         const Float own_weight = select(has_light, Float(0.25f), Float(0.0f)), least = max(variance, Float(0.0f));
         Vec3 sum = light * own_weight;
         Float total = own_weight, squares = least * own_weight * own_weight;
@@ -429,17 +421,10 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
                 const std::ptrdiff_t there = at + dy * step * down + dx * step;
                 const Float of_other = load(from[variance_light] + there);
                 const Int surface_there = surfaces_at(layer, there);
-                Bool same = surface_there == surface, in_mirror = bool_of(false);
-                if (pass == 0 && any_specular) {
-                    in_mirror = specular & (((surface_there ^ surface) & Int(mirrored_unit - 1)) == Int(0));
-                    same = same | in_mirror;
-                }
-                same = same & (of_other > Float(no_light));
+                const Bool same = (surface_there == surface) & (of_other > Float(no_light));
                 if (!any(same))
                     continue;
-                Vec3 other = load3(from, there);
-                if (pass == 0 && any_specular)
-                    other = select(in_mirror, other * load3(guides + albedo_guide, there) * inverse_albedo, other);
+                const Vec3 other = load3(from, there);
                 const Float difference = luminance(other) - own;
                 const Float spread = least + max(of_other, least) + Float(least_variance);
                 const auto falling = [](Float a) __attribute__((always_inline)) {
@@ -458,8 +443,7 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
                     weight = weight * alike * falling(apart * inverse_tolerance);
                 }
                 const Float plausible = falling(difference * difference / (spread * tolerated));
-                weight = select(same, select(in_mirror, kernel, weight * select(has_light, plausible, Float(1.0f))),
-                                Float(0.0f));
+                weight = select(same, weight * select(has_light, plausible, Float(1.0f)), Float(0.0f));
                 sum = sum + other * weight;
                 squares = squares + weight * weight * max(of_other, least);
                 total = total + weight;
