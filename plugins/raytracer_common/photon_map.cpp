@@ -126,7 +126,7 @@ void PhotonMap::mark_near(float negligible) {
             for (std::int32_t &coordinate : cell)
                 coordinate >>= 1;
         std::ranges::sort(cells);
-        cells.erase(std::ranges::unique(cells).begin(), cells.end());
+        cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
     }
 }
 

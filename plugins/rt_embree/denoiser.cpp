@@ -174,16 +174,17 @@ void Denoiser::clear(const Tile &tile) {
 Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles,
                         ThreadPool &threads) const {
     constexpr std::int32_t chunk = 8; // rows
-    const auto chunks_of = [](const Layer &layer) { return (layer.height + chunk - 1) / chunk; };
+    const auto chunks_of = [](const Layer &layer) {
+        return static_cast<std::size_t>(layer.height + chunk - 1) / static_cast<std::size_t>(chunk);
+    };
     // Calls step(layer, row) for all rows of the layers that have more than `pass` passes.
     const auto for_each_row = [&](int pass, auto step) {
         const bool has_catchers = pass < denoising_.catchers.filter_passes();
-        const std::int32_t of_objects = chunks_of(denoising_.objects),
-                           of_catchers = has_catchers ? chunks_of(denoising_.catchers) : 0;
-        threads.for_each(static_cast<std::size_t>(of_objects + of_catchers), [&](std::size_t i, std::size_t) {
-            const bool is_object = static_cast<std::int32_t>(i) < of_objects;
-            const Layer &layer = is_object ? denoising_.objects : denoising_.catchers;
-            const std::int32_t first = (static_cast<std::int32_t>(i) - (is_object ? 0 : of_objects)) * chunk;
+        const std::size_t of_objects = chunks_of(denoising_.objects),
+                          of_catchers = has_catchers ? chunks_of(denoising_.catchers) : 0;
+        threads.for_each(of_objects + of_catchers, [&](std::size_t i, std::size_t) {
+            const Layer &layer = i < of_objects ? denoising_.objects : denoising_.catchers;
+            const auto first = static_cast<std::int32_t>(i < of_objects ? i : i - of_objects) * chunk;
             for (std::int32_t row = first; row < std::min(first + chunk, layer.height); ++row)
                 step(layer, row);
         });
