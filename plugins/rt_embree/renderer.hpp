@@ -98,9 +98,8 @@ private:
     std::vector<arhost::raytracer_common::Photon> photons_;
     std::vector<std::int8_t> photon_faces_; // see TracePhotons
     arhost::raytracer_common::PhotonMap photon_map_;
-    static constexpr std::size_t photon_sets = 16;
-    std::array<std::optional<PhotonSums>, photon_sets>
-        photon_sums_; // of the scene as it is placed; empty: not traced
+    // Of the scene as it is placed. Empty elements have not been traced.
+    std::array<std::optional<PhotonSums>, 16> photon_sums_;
     std::uint32_t photons_per_set_ = 0;
     arhost::raytracer_common::VideoImage video_;
     bool has_video_ = false; // of the current frame

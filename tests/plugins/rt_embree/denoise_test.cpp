@@ -14,13 +14,18 @@ namespace {
 constexpr std::uint32_t width = 200, height = 150; // of pinhole()
 const Options noisy{{"samples", "1"}}, denoised{{"quality", "realtime"}}, converged{{"samples", "256"}};
 
-// Objects of several materials on a table, in soft light.
-SceneBuilder still_life() {
+// Settings of a scene whose surroundings send this light from everywhere.
+scene::Settings path_traced(float background) {
     scene::Settings settings;
     settings.integrator = ARHOST_INTEGRATOR_PATH;
     settings.ambient = glm::vec3(0);
-    settings.background = glm::vec3(0.4f);
-    SceneBuilder scene(settings);
+    settings.background = glm::vec3(background);
+    return settings;
+}
+
+// Objects of several materials on a table, in soft light.
+SceneBuilder still_life() {
+    SceneBuilder scene(path_traced(0.4f));
     scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
     scene.add_ball("red", {-35, 0, 25, 25}, diffuse(0.7f, 0.2f, 0.1f));
     scene.add_mesh("box", moved(cube(15), {30, 20, 15}), diffuse(0.7f, 0.7f, 0.7f));
@@ -225,11 +230,7 @@ struct FarChange {
 class DenoisingOfFarChanges : public testing::TestWithParam<FarChange> {
 protected:
     static SceneBuilder scene() {
-        scene::Settings settings;
-        settings.integrator = ARHOST_INTEGRATOR_PATH;
-        settings.ambient = glm::vec3(0);
-        settings.background = glm::vec3(0.1f);
-        SceneBuilder scene(settings);
+        SceneBuilder scene(path_traced(0.1f));
         scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
         if (GetParam().has_mirror)
             scene.add_mesh("mirror", quad({-90, -15, 40}, {-90, 15, 40}, {-90, 15, 52}, {-90, -15, 52}),
@@ -279,11 +280,7 @@ INSTANTIATE_TEST_SUITE_P(Slopes, DenoisingOfCaustics, testing::Values(0, 30),
 
 TEST_P(DenoisingOfCaustics, LoseNoLight) {
     const auto scene = [] {
-        scene::Settings settings;
-        settings.integrator = ARHOST_INTEGRATOR_PATH;
-        settings.ambient = glm::vec3(0);
-        settings.background = glm::vec3(0.1f);
-        SceneBuilder scene(settings);
+        SceneBuilder scene(path_traced(0.1f));
         const double slope = GetParam() * std::numbers::pi / 180;
         const auto corner = [&](double x, double y) {
             return glm::vec3(x * std::cos(slope), y, x * std::sin(slope));
@@ -314,10 +311,7 @@ TEST_P(DenoisingOfCaustics, LoseNoLight) {
 // After five frames, nothing is left of where a ball and its shadow were.
 TEST(DenoisingOfMotion, ForgetsWhatHasMoved) {
     const auto make = [] {
-        scene::Settings settings;
-        settings.integrator = ARHOST_INTEGRATOR_PATH;
-        settings.ambient = glm::vec3(0);
-        settings.background = glm::vec3(0.4f);
+        scene::Settings settings = path_traced(0.4f);
         settings.duration_s = 1;
         SceneBuilder scene(settings);
         scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
