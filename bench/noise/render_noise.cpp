@@ -5,11 +5,14 @@
 // Renders frames like a run does, with the state of each frame passed to the next, blends them with a grey video, and
 // compares them with converged pictures. Prints, by kind of surface, the RMS difference in codes, and the temporal
 // standard deviation if the camera stands still. Keys: width, height, samples, light_samples, photons, denoise,
-// threads, frames, orbit (degrees per frame), reference (frames of 64 samples), out (folder for the pictures).
+// threads, frames, orbit (degrees per frame), reference (frames of 64 samples), out (folder for the pictures), and
+// for scenes with `motion`: stop (the frame from which on nothing moves), show, hide (the frames from which on the
+// moving objects are visible, and no longer visible).
 #include "bunny.hpp"
 #include "pixels/linear.hpp"
 #include "raytracer_common/scene_geometry.hpp"
 #include "renderer.hpp"
+#include "scene/motion.hpp"
 #include "scene/scene_loader.hpp"
 
 #include <arhost/shading/scalar.hpp>
@@ -24,6 +27,7 @@
 #include <exception>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -87,7 +91,9 @@ std::vector<Kind> kinds(const rt_embree::EmbreeScene &scene, const arhost_camera
                 result.push_back(outside);
                 continue;
             }
-            const unsigned number = ray.hit.instID[0] == RTC_INVALID_GEOMETRY_ID ? ray.hit.geomID : ray.hit.instID[0];
+            const bool is_moving = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID &&
+                                   static_cast<std::int32_t>(ray.hit.instID[0]) != scene.view().static_instance;
+            const unsigned number = is_moving ? ray.hit.instID[0] : ray.hit.geomID;
             const arhost_object &object = objects[number];
             const auto model = materials[object.material].model;
             result.push_back(object.role != ARHOST_ROLE_VIRTUAL                                  ? catcher
@@ -113,7 +119,7 @@ public:
         for (auto &state : states_)
             state.resize(renderer_.state_size() / sizeof(Aligned) + 1);
     }
-    Codes frame(const arhost_camera &camera, std::uint64_t sequence) {
+    Codes frame(const arhost_camera &camera, std::uint64_t sequence, const arhost_motion *motion) {
         const arhost_image image{sizeof(arhost_image),
                                  16 * camera.intrinsics.width,
                                  camera.intrinsics.width,
@@ -126,7 +132,7 @@ public:
             state = {count_ > 0 ? states_[(count_ + 1) % 2].data() : nullptr, states_[count_ % 2].data()};
         const auto begin = std::chrono::steady_clock::now();
         const std::clock_t cpu = std::clock();
-        renderer_.render(camera, image, nullptr, nullptr, sequence, state);
+        renderer_.render(camera, image, motion, nullptr, sequence, state);
         wall_ms.push_back(
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
         cpu_ms.push_back(1000.0 * static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
@@ -146,15 +152,42 @@ private:
     std::size_t count_ = 0;
 };
 
+// The moving objects of a scene.
+class MovingObjects {
+public:
+    explicit MovingObjects(const arhost_scene &scene) {
+        const auto objects = arhost::raytracer_common::elements<arhost_object>(scene, scene.objects);
+        if (std::ranges::any_of(objects, [](const arhost_object &object) { return object.moves != 0; }))
+            motion_.emplace(scene);
+    }
+    // Returns NULL if nothing moves. The result is valid until the next call.
+    const arhost_motion *at(double time_s, bool are_visible) {
+        if (!motion_)
+            return nullptr;
+        now_ = motion_->at(time_s);
+        moved_.assign(now_.moved, now_.moved + now_.moved_count);
+        for (arhost_moved_object &object : moved_)
+            object.is_visible = are_visible;
+        now_.moved = moved_.data();
+        return &now_;
+    }
+
+private:
+    std::optional<arhost::scene::MotionEvaluator> motion_;
+    arhost_motion now_{};
+    std::vector<arhost_moved_object> moved_;
+};
+
 double median(std::vector<double> values) {
     std::ranges::sort(values);
     return values[values.size() / 2];
 }
 
 void run(int argc, char **argv) {
-    std::map<std::string, double> value{{"width", 640}, {"height", 480}, {"samples", 1},       {"light_samples", 4},
-                                        {"denoise", 1}, {"threads", 0},  {"photons", 1 << 14}, {"frames", 16},
-                                        {"orbit", 0},   {"reference", 8}};
+    std::map<std::string, double> value{{"width", 640}, {"height", 480},  {"samples", 1},       {"light_samples", 4},
+                                        {"denoise", 1}, {"threads", 0},   {"photons", 1 << 14}, {"frames", 16},
+                                        {"orbit", 0},   {"reference", 8}, {"stop", 1e9},        {"show", 0},
+                                        {"hide", 1e9}};
     std::string out;
     for (int i = 2; i < argc; ++i) {
         const std::string argument = argv[i], key = argument.substr(0, argument.find('='));
@@ -181,9 +214,16 @@ void run(int argc, char **argv) {
     converged.samples = 64;
     Run noisy(setup, settings, arhost::Host(&host)), reference(setup, converged, arhost::Host(&host));
     const int frames = static_cast<int>(value["frames"]), references = static_cast<int>(value["reference"]);
+    MovingObjects objects(arena.scene());
+    const auto motion_at = [&](int frame) {
+        constexpr double frame_rate_hz = 30;
+        return objects.at(std::min<double>(frame, value["stop"]) / frame_rate_hz,
+                          frame >= value["show"] && frame < value["hide"]);
+    };
     std::vector<Codes> last; // the pictures of the last frames
     for (int i = 0; i < frames; ++i) {
-        Codes codes = noisy.frame(orbiting(intrinsics, 25 + i * value["orbit"]), static_cast<std::uint64_t>(i));
+        Codes codes =
+            noisy.frame(orbiting(intrinsics, 25 + i * value["orbit"]), static_cast<std::uint64_t>(i), motion_at(i));
         if (!out.empty())
             write_ppm(out + "/frame-" + std::to_string(i) + ".ppm", codes, width, height);
         last.push_back(std::move(codes));
@@ -191,7 +231,7 @@ void run(int argc, char **argv) {
     const arhost_camera camera = orbiting(intrinsics, 25 + (frames - 1) * value["orbit"]);
     Codes mean;
     for (int i = 0; i < references; ++i) {
-        const Codes codes = reference.frame(camera, static_cast<std::uint64_t>(i));
+        const Codes codes = reference.frame(camera, static_cast<std::uint64_t>(i), motion_at(frames - 1));
         if (mean.empty())
             mean.resize(codes.size());
         for (std::size_t k = 0; k < codes.size(); ++k)

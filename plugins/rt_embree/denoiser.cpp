@@ -17,14 +17,15 @@ namespace {
 // The state begins with this, followed by the objects and the rows of the history.
 struct StateHeader {
     std::uint32_t version, width, height;
-    std::uint32_t first, frames; // number of the history's first frame, and of the frames since
+    std::uint32_t first, frames;  // number of the history's first frame, and of the frames since
+    std::uint32_t frames_at_rest; // number of frames since an object has moved
     Camera camera;
 };
 struct ObjectState {
     float world_from_object[12];
     std::uint32_t is_visible;
 };
-constexpr std::uint32_t state_version = 2;
+constexpr std::uint32_t state_version = 3;
 constexpr std::size_t alignment = 64; // of the rows, bytes
 
 std::size_t aligned(std::size_t size) {
@@ -97,6 +98,13 @@ void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
             std::ranges::generate(light, take);
     }
     denoising_.taps = taps_.data();
+    const auto changes_of = [](const Layer &layer) {
+        const std::int32_t lines = (layer.height + Layer::change_side - 1) / Layer::change_side;
+        return static_cast<std::size_t>(lines * layer.changes_per_row());
+    };
+    changes_.assign(changes_of(*layers[0]) + changes_of(*layers[1]), Change{});
+    layers[0]->changes = changes_.data();
+    layers[1]->changes = changes_.data() + changes_of(*layers[0]);
 }
 
 const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
@@ -108,7 +116,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     const std::array<Layer *, 2> layers{&denoising_.objects, &denoising_.catchers};
     auto *state = static_cast<std::byte *>(slots.after);
     std::memset(state, 0, rows_offset(objects_));
-    StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, camera}, earlier{};
+    StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, 0, camera}, earlier{};
     const auto *before = static_cast<const std::byte *>(slots.before);
     if (before)
         std::memcpy(&earlier, before, sizeof earlier);
@@ -116,7 +124,6 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         before = nullptr;
     else
         header.first = earlier.first, header.frames = earlier.frames + 1;
-    std::memcpy(state, &header, sizeof header);
     auto *now = reinterpret_cast<ObjectState *>(state + sizeof header);
     for (std::size_t i = 0; i < objects.size(); ++i) {
         std::copy_n(objects[i].world_from_object, 12, now[i].world_from_object);
@@ -154,10 +161,17 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
             write_motion(now[i].world_from_object, then[i].world_from_object, motion_.data() + 12 * i);
         denoising_.before_from_now = motion_.data();
     }
-    if (then || deforms) { // shadows and reflections move over objects that do not
-        denoising_.most_frames = 6;
-        denoising_.catcher_phase = -1;
-    }
+    // Shadows and reflections of what has moved change the light of what has not. Where the change is smaller than
+    // the noise, it is found in the frames that follow.
+    constexpr std::uint32_t frames_to_find_change = 8;
+    header.frames_at_rest = then || deforms ? 0
+                            : before        ? std::min(earlier.frames_at_rest + 1, frames_to_find_change)
+                                            : frames_to_find_change;
+    if (catcher_cell_px_ == 1 && (header.frames_at_rest == 0 || header.frames < frames_to_find_change))
+        denoising_.catcher_phase = -1; // sharp shadows have moved or are new
+    denoising_.finds_change = header.frames_at_rest < frames_to_find_change;
+    std::ranges::fill(changes_, Change{});
+    std::memcpy(state, &header, sizeof header);
     return denoising_;
 }
 
@@ -173,7 +187,7 @@ void Denoiser::clear(const Tile &tile) {
 
 Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles,
                         ThreadPool &threads) const {
-    constexpr std::int32_t chunk = 8; // rows
+    constexpr std::int32_t chunk = Layer::change_side; // rows; a square of Layer::changes has one thread
     const auto chunks_of = [](const Layer &layer) {
         return static_cast<std::size_t>(layer.height + chunk - 1) / static_cast<std::size_t>(chunk);
     };
@@ -193,6 +207,8 @@ Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<cons
         if (frame.goes_on(frame.progress))
             kernel.find_taps(frame, tiles[i]);
     });
+    if (denoising_.finds_change)
+        for_each_row(0, [&](const Layer &layer, std::int32_t row) { kernel.find_change(frame, layer, row); });
     for_each_row(0, [&](const Layer &layer, std::int32_t row) { kernel.accumulate_row(frame, layer, row); });
     const int passes = denoising_.objects.filter_passes();
     for (int pass = 0; pass < passes; ++pass)

@@ -49,6 +49,7 @@ private:
     std::uint64_t state_size_;
     std::vector<float> planes_;
     std::vector<unsigned> taps_;
+    std::vector<Change> changes_;
     std::vector<float> motion_; // Denoising::before_from_now
     Denoising denoising_{};
 };

@@ -261,6 +261,12 @@ enum HistoryRow : int {
     history_rows
 };
 
+// Sums over cells: the number of cells, and the difference between the luminance of the light in this frame and its
+// mean before.
+struct Change {
+    float count, sum, squares;
+};
+
 // A grid of the denoiser. Histories have rows of `stride` values, a multiple of 16. Guides and light have `margin`
 // more values on both sides of a row, without a surface.
 struct Layer {
@@ -272,6 +278,9 @@ struct Layer {
     float *light[2][light_rows];       // each step of the filter reads one and writes the other
     const float *before[history_rows]; // of the previous frame; NULL: there is none
     float *after[history_rows];
+    static constexpr std::int32_t change_side = 8;
+    Change *changes; // of squares of change_side cells
+    std::int32_t changes_per_row() const { return stride / change_side; }
     std::int32_t guide_stride() const { return stride + 2 * margin; }
     // Of the filter. Those of larger cells begin with wider steps.
     int filter_passes() const { return cell_px == 1 ? 5 : 4; }
@@ -287,6 +296,7 @@ struct Denoising {
     bool camera_moved;
     float pixel_angle;         // width of a pixel in the middle of the image, in units of its distance
     float most_frames;         // that count in the means
+    bool finds_change;         // whether to look for light that has changed
     std::int32_t flat_surface; // number of that of PathScene::wide_catcher; 0: there is none
     // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels.
     std::int32_t catcher_phase;
@@ -296,6 +306,9 @@ struct Denoising {
     // axes. NULL if no placement has changed.
     const float *before_from_now;
 };
+
+// The content of an image: values of the option `show`, in the order of plugin.cpp.
+enum class View : std::int32_t { picture, shadow, bounce, caustics, history, variance, normals };
 
 struct Frame {
     Scene scene;
@@ -314,6 +327,7 @@ struct Frame {
     std::uint32_t first_random; // offset into the random sequences of the path integrator
     PathScene path;
     const Denoising *denoising; // NULL: off
+    View view;                  // the picture if `denoising` is NULL
     bool blends_codes; // straight images of the path integrator: the host blends sRGB codes, not linear light
     // Called on any thread after each sample of a tile and before each chunk of photons, because a tile may take
     // seconds. Reports progress; returns whether the image is still wanted.
@@ -382,7 +396,7 @@ using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint
                               arhost::raytracer_common::Photon *to, std::int8_t *faces);
 
 // A step of the denoiser on one row of a layer, or on one tile. `pass`: of the filter.
-using AccumulateRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row);
+using DenoiseRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row);
 using FilterRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
 using DenoiseTile = void (*)(const Frame &frame, const Tile &tile);
 // Writes a row of the image. Returns the bounding rectangle of the pixels that virtual objects affect.
@@ -391,42 +405,22 @@ using ResolveRow = Rectangle (*)(const Frame &frame, std::int32_t row);
 struct Kernel {
     RenderTile render_tile, render_path_tile;
     TracePhotons trace_photons;
-    AccumulateRow accumulate_row;
+    DenoiseRow find_change, accumulate_row;
     FilterRow filter_row;
     DenoiseTile find_taps;
     ResolveRow resolve_row;
     const char *name;
 };
 
+// The kernels of the instruction sets.
 namespace base {
-Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
-                   std::int8_t *faces);
-void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row);
-void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
-void find_taps(const Frame &frame, const Tile &tile);
-Rectangle resolve_row(const Frame &frame, std::int32_t row);
-} // namespace base
+Kernel kernel();
+}
 namespace avx2 {
-Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
-                   std::int8_t *faces);
-void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row);
-void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
-void find_taps(const Frame &frame, const Tile &tile);
-Rectangle resolve_row(const Frame &frame, std::int32_t row);
-} // namespace avx2
+Kernel kernel();
+}
 namespace avx512 {
-Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
-                   std::int8_t *faces);
-void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row);
-void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
-void find_taps(const Frame &frame, const Tile &tile);
-Rectangle resolve_row(const Frame &frame, std::int32_t row);
-} // namespace avx512
+Kernel kernel();
+}
 
 } // namespace rt_embree

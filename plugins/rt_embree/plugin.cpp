@@ -5,11 +5,15 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
 namespace rt_embree {
 namespace {
+
+constexpr const char *views[] = {"picture", "shadow",   "bounce",  "caustics",
+                                 "history", "variance", "normals", nullptr}; // as in View
 
 class Plugin {
 public:
@@ -21,6 +25,12 @@ public:
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
         settings_.denoise = quality_ != "reference" && !settings_.accumulate;
+        settings_.view = static_cast<View>(std::ranges::find(views, options.text("show")) - views);
+        if (settings_.view != View::picture && !settings_.denoise)
+            throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                                  "option 'show': '" + options.text("show") +
+                                      "' is a view of the denoiser; use 'quality: realtime' or 'balanced', and not "
+                                      "'accumulate'");
         settings_.single_path = options.text("glass") == "path";
         settings_.photons = static_cast<std::uint32_t>(options.integer("photons"));
         if (const double bound = options.real("max_radiance"); bound > 0)
@@ -37,6 +47,9 @@ public:
                    std::to_string(setup.scene->objects.count) + " objects, " +
                    std::to_string(renderer_->thread_count()) + " threads, instruction set " +
                    renderer_->kernel_name());
+        if (settings_.view != View::picture && renderer_->state_size() == 0)
+            throw arhost::Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                                  "option 'show': images of this scene are not denoised; only 'picture' is possible");
         if (settings_.denoise && setup.scene->integrator == ARHOST_INTEGRATOR_PATH && renderer_->state_size() == 0)
             host_.info("images are not denoised: the scene has a glossy catcher, or too many objects");
     }
@@ -111,6 +124,12 @@ constexpr arhost_option_descriptor options[] = {
                    "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
                    "0: none.",
                    0, arhost::raytracer_common::max_photons),
+    arhost::option(
+        ARHOST_OPTION_TEXT, "show", "picture",
+        "What images show: the picture, or a part of it for inspection. Of the change of a catcher's light: "
+        "'shadow' (grey: none), 'bounce' or 'caustics'. Of the denoiser: the length of the 'history' (white: "
+        "32 frames), the standard deviation that is left ('variance'; white: 0.1), or 'normals'.",
+        0, 0, views),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Render threads; 0: one per processor.", 0, 256),
     arhost::option(ARHOST_OPTION_BOOL, "robust", "false",
                    "Prevent rays from passing between triangles that share an edge (watertight); about 10 % slower."),

@@ -79,15 +79,12 @@ Kernel choose_kernel(const std::string &instruction_set) {
 #if defined(__x86_64__)
     if (requested("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
-        return {avx512::render_tile, avx512::render_path_tile, avx512::trace_photons, avx512::accumulate_row,
-                avx512::filter_row,  avx512::find_taps,        avx512::resolve_row,   "avx512"};
+        return avx512::kernel();
     if (requested("avx2") && __builtin_cpu_supports("avx2"))
-        return {avx2::render_tile, avx2::render_path_tile, avx2::trace_photons, avx2::accumulate_row,
-                avx2::filter_row,  avx2::find_taps,        avx2::resolve_row,   "avx2"};
+        return avx2::kernel();
 #endif
     if (requested("base"))
-        return {base::render_tile, base::render_path_tile, base::trace_photons, base::accumulate_row,
-                base::filter_row,  base::find_taps,        base::resolve_row,   "base"};
+        return base::kernel();
     throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                   "option 'instruction_set': this processor or this build of rt_embree does not support '" +
                       instruction_set + "'; use 'auto'");
@@ -127,7 +124,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
                  threads_),
       samples_per_frame_(settings.samples), samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
-      single_path_(settings.single_path), max_radiance_(settings.max_radiance),
+      single_path_(settings.single_path), max_radiance_(settings.max_radiance), view_(settings.view),
       blends_codes_(setup.compositing != ARHOST_COMPOSITING_LINEAR), full_samples_(settings.samples),
       photons_per_sample_(settings.photons),
       max_radius_squared_(arhost::raytracer_common::max_radius_squared(full_intrinsics_)) {
@@ -359,17 +356,20 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 first_random,
                 path_scene(),
                 nullptr,
+                View::picture,
                 blends_codes_,
                 [](const void *of) { return static_cast<const Progress *>(of)->goes_on(); },
                 &progress};
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
-    if (denoiser_ && state.after)
+    if (denoiser_ && state.after) {
+        frame.view = view_;
         frame.denoising = &denoiser_->begin(
             state, intrinsics_, frame.camera, scene_.placed_objects(), motion && motion->deformed_count > 0,
             static_cast<std::uint32_t>(sequence), full_samples_, windows.wide_catcher());
-    if (frame.denoising && finds_unchanged())
+    }
+    if (frame.denoising && finds_unchanged() && view_ == View::picture)
         frame.path.wide_catcher = windows.wide_catcher();
     if (lights_)
         trace_photons(frame);

@@ -30,7 +30,8 @@ struct Settings {
     float max_radiance = 100;        // path integrator: bound of each sample; infinity: none
     std::uint32_t photons = 1 << 14; // path integrator: light rays from lamps per frame and sample, for caustics
     std::string instruction_set = "auto";
-    bool denoise = false; // path integrator
+    bool denoise = false;      // path integrator
+    View view = View::picture; // else it needs `denoise`
 };
 
 // Owns the memory of a thread's `Scratch`.
@@ -91,6 +92,7 @@ private:
     std::vector<float> irradiance_;                                                             // of the environment
     float brightest_texel_ = 0;                                                                 // of PathScene
     float max_radiance_;
+    View view_;
     bool blends_codes_;          // as in Frame
     std::uint32_t full_samples_; // the random numbers of a frame begin at its number times this
     std::uint32_t photons_per_sample_;

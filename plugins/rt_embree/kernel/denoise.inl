@@ -300,6 +300,78 @@ ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, const Lay
     return light * select(value > limit, limit / max(value, Float(1e-6f)), Float(1.0f));
 }
 
+// Adds the difference between the light of a row's cells in this frame and before to Layer::changes, and keeps the
+// means before in Layer::after for accumulate().
+ARHOST_INLINE void find_change(const Frame &frame, const Layer &layer, std::int32_t row) {
+    for (std::int32_t x = 0; x < layer.width; x += lanes) {
+        const std::ptrdiff_t at = guide_at(layer, x, row), kept = history_at(layer, x, row);
+        const Int surface = surfaces_at(layer, at);
+        const Bool active = has_light_in(layer, surface);
+        if (!any(active))
+            continue;
+        const Past past = past_of(frame, layer, x, row, load3(layer.guides + position_guide, at),
+                                  load3(layer.guides + normal_guide, at), surface, active);
+        store3(layer.after, kept, past.light);
+        store(layer.after[moment_history] + kept, past.moments[0]);
+        store(layer.after[moment_history + 1] + kept, past.moments[1]);
+        store(layer.after[frames_history] + kept, past.frames);
+        const Bool counts =
+            active & (past.frames > Float(0.0f)) & (load(layer.light[0][variance_light] + at) == Float(sampled));
+        const Float light = luminance(light_without_fireflies(*frame.denoising, layer, at, row, surface));
+        const Float change = select(counts, min(light, Float(65504.0f)) - past.moments[0], Float(0.0f));
+        alignas(64) float changes[lanes];
+        store(changes, change);
+        const unsigned mask = mask_of(counts.lane);
+        Change *to = layer.changes + row / Layer::change_side * layer.changes_per_row() + x / Layer::change_side;
+        for (int i = 0; i < lanes; ++i) {
+            Change &sums = to[i / Layer::change_side];
+            sums.count += static_cast<float>(mask >> i & 1);
+            sums.sum += changes[i];
+            sums.squares += changes[i] * changes[i];
+        }
+    }
+}
+
+// Returns how certain it is that the mean of a change is not 0: the square of Student's t.
+ARHOST_INLINE float evidence_of(const Change &change) {
+    constexpr float least_count = 8, negligible = 1e-6f; // variance
+    if (change.count < least_count)
+        return 0;
+    const float mean = change.sum / change.count;
+    const float variance = change.squares / change.count - mean * mean;
+    return change.count * mean * mean / (variance > negligible ? variance : negligible);
+}
+
+// Returns how many frames may count in the means of a row's cells.
+ARHOST_INLINE Float most_frames_of(const Denoising &denoising, const Layer &layer, int x, int row) {
+    if (!denoising.finds_change)
+        return Float(denoising.most_frames);
+    alignas(64) float frames[lanes];
+    const int columns = layer.changes_per_row(), line = row / Layer::change_side;
+    const int lines = (layer.height + Layer::change_side - 1) / Layer::change_side;
+    for (int first = 0; first < lanes; first += Layer::change_side) {
+        const int column = (x + first) / Layer::change_side;
+        Change around{};
+        for (int i = 0; i < 9; ++i) {
+            const int near_line = line + i / 3 - 1, near_column = column + i % 3 - 1;
+            if (near_line < 0 || near_line >= lines || near_column < 0 || near_column >= columns)
+                continue;
+            const Change &change = layer.changes[near_line * columns + near_column];
+            around.count += change.count;
+            around.sum += change.sum;
+            around.squares += change.squares;
+        }
+        const float here = evidence_of(layer.changes[line * columns + column]), near = evidence_of(around);
+        const float evidence = here > near ? here : near;
+        constexpr float negligible = 4; // 5 % of unchanged squares have more
+        const float doubt = negligible / (evidence > negligible ? evidence : negligible);
+        const float most = denoising.most_frames * doubt * doubt;
+        for (int i = 0; i < Layer::change_side; ++i)
+            frames[first + i] = most > 1 ? most : 1;
+    }
+    return load(frames);
+}
+
 // Values of variance_light: too few frames tell the variance; the light of a surface is not known.
 constexpr float unknown = -1, no_light = -2;
 
@@ -318,20 +390,28 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         const float *const *guides = layer.guides;
         const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
         const Vec3 light = light_without_fireflies(denoising, layer, at, row, surface);
-        const Past past = past_of(frame, layer, x, row, position, normal, surface, active);
+        Past past;
+        if (denoising.finds_change)
+            past = {load3(layer.after, kept),
+                    {load(layer.after[moment_history] + kept), load(layer.after[moment_history + 1] + kept)},
+                    load(layer.after[frames_history] + kept)};
+        else
+            past = past_of(frame, layer, x, row, position, normal, surface, active);
         const Bool is_new = load(layer.light[0][variance_light] + at) == Float(sampled);
-        Float most(denoising.most_frames);
+        Float most = most_frames_of(denoising, layer, x, row);
         // The surroundings have no noise in mirrors and glass.
         const Bool shows_surroundings = is_kind(surface, specular_surface) & (surface < Int(mirrored_unit));
-        if (denoising.camera_moved) {
-            // Highlights move over the surface, and curved mirrors and glass show a surface elsewhere than
-            // store_seen() assumes.
+        if (denoising.camera_moved || denoising.before_from_now) // highlights move over the surface
             most = select(is_kind(surface, glossy_surface), min(most, Float(8.0f)), most);
+        if (denoising.camera_moved) {
+            // Curved mirrors and glass show a surface elsewhere than store_seen() assumes.
             most = select(is_kind(surface, specular_surface), min(most, Float(4.0f)), most);
             most = select(shows_surroundings, Float(1.0f), most);
         }
         const Float more = select(is_new, Float(1.0f), Float(0.0f));
-        const Float frames = select(active, min(past.frames + more, most), Float(0.0f));
+        // A cell that is not sampled in this frame does not keep the light of before a change.
+        const Bool counts = active & (is_new | (most > Float(2.0f)));
+        const Float frames = select(counts, min(past.frames + more, most), Float(0.0f));
         const Float share = more / max(frames, Float(1.0f));
         const Vec3 mean = past.light + (light - past.light) * share;
         const Float value = min(luminance(light), Float(65504.0f));
@@ -346,7 +426,7 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         store(layer.after[distance_history] + kept,
               select(active, length(position - splat(frame.camera.eye)), Float(0.0f)));
         store(layer.after[normal_history] + kept, float_of(select(active, packed_normal(normal), Int(0))));
-        store(layer.after[surface_history] + kept, float_of(select(active, surface, Int(0))));
+        store(layer.after[surface_history] + kept, float_of(select(frames > Float(0.0f), surface, Int(0))));
         store(layer.after[frames_history] + kept, frames);
         store3(layer.light[1], at, select(active, mean, black()));
         store(layer.light[1][variance_light] + at, select(active, variance, Float(0.0f)));
@@ -581,7 +661,7 @@ ARHOST_INLINE void find_taps_of(const Frame &frame, const EdgePixel &one, const 
 }
 
 // Finds the taps of the pixels of a tile.
-ARHOST_INLINE void find_taps_of(const Frame &frame, const Tile &tile) {
+ARHOST_INLINE void find_taps(const Frame &frame, const Tile &tile) {
     const Denoising &denoising = *frame.denoising;
     const Layer &layer = denoising.objects;
     const Rectangle &all = tile.pixels;
@@ -692,6 +772,47 @@ private:
     int flat_surface_, x_, row_;
 };
 
+// Returns what Frame::view shows of the pixels of a row.
+ARHOST_INLINE Vec3 viewed(const Frame &frame, const InterpolatedCatchers &catchers, int x, int row, Int surface) {
+    const Layer &objects = frame.denoising->objects, &cells = frame.denoising->catchers;
+    const Bool is_caught = has_light_in(cells, surface);
+    const Int cell = cells.cell_px == 1 ? lane_numbers() : lane_numbers() >> Int(1);
+    const auto value = [&](const float *of_objects, const float *of_cells) __attribute__((always_inline)) {
+        return select(is_caught, pick(of_cells, cell), load(of_objects));
+    };
+    const std::ptrdiff_t at = guide_at(objects, x, row),
+                         at_cell = guide_at(cells, x / cells.cell_px, row / cells.cell_px);
+    const auto grey = [](Float a) { return Vec3{a, a, a}; };
+    switch (frame.view) {
+    case View::history: {
+        const std::ptrdiff_t kept = history_at(objects, x, row),
+                             kept_cell = history_at(cells, x / cells.cell_px, row / cells.cell_px);
+        return grey(value(objects.after[frames_history] + kept, cells.after[frames_history] + kept_cell) *
+                    Float(1 / frame.denoising->most_frames));
+    }
+    case View::variance: {
+        const auto variance = [](const Layer &layer) {
+            return layer.light[(layer.filter_passes() + 1) & 1][variance_light];
+        };
+        constexpr float white = 0.1f; // standard deviation
+        return grey(sqrt(max(value(variance(objects) + at, variance(cells) + at_cell), Float(0.0f))) *
+                    Float(1 / white));
+    }
+    case View::normals: {
+        const auto component = [&](int i) __attribute__((always_inline)) {
+            const Float normal =
+                value(objects.guides[normal_guide + i] + at, cells.guides[normal_guide + i] + at_cell);
+            return normal * Float(0.5f) + Float(0.5f);
+        };
+        return {component(0), component(1), component(2)};
+    }
+    default: {
+        const Vec3 change = catchers.of(surface);
+        return select(is_caught, frame.view == View::shadow ? (white() + change) * Float(0.5f) : change, black());
+    }
+    }
+}
+
 // Writes a row of the image.
 ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
     const Denoising &denoising = *frame.denoising;
@@ -704,7 +825,8 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
         const Int taps = load(denoising.taps + history_at(layer, x, row));
         const std::ptrdiff_t at = guide_at(layer, x, row);
         const Int own_surface = surfaces_at(layer, at);
-        const Bool plain = taps == Int(static_cast<int>(only_own));
+        const bool is_picture = frame.view == View::picture;
+        const Bool plain = is_picture ? taps == Int(static_cast<int>(only_own)) : bool_of(true);
         if (!any(~plain | ((own_surface != Int(0)) & (own_surface != Int(unchanged_surface))))) {
             write_untouched(frame, x, row, width);
             continue;
@@ -721,7 +843,11 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
                 transmittance = transmittance + select(changed, catchers.of(surface), black());
             linear.transmittance = linear.transmittance + select(is_real, transmittance * share, black());
         };
-        add(own_surface, load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
+        if (is_picture)
+            add(own_surface, load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
+        else
+            linear = {select(own_surface == Int(0), black(), viewed(frame, catchers, x, row, own_surface)),
+                      select(own_surface == Int(0), white(), black())};
         const Bool edges = ~plain & (lane_numbers() < Int(width));
         if (any(edges)) {
             for (int i = 0; i < tap_count; ++i) {

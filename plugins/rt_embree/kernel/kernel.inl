@@ -5,6 +5,9 @@
 #include "kernel.hpp"
 #include "packet.hpp"
 
+#define ARHOST_TEXT_OF(token) #token
+#define ARHOST_TEXT(macro) ARHOST_TEXT_OF(macro)
+
 namespace rt_embree::ARHOST_ISA {
 namespace {
 
@@ -289,36 +292,17 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     return drawn;
 }
 
-} // namespace
-
-Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
-    return render<Whitted>(frame, tile, scratch);
-}
-
-Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
-    return render<Path>(frame, tile, scratch);
-}
-
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
                    std::int8_t *faces) {
     for (std::uint32_t i = 0; i < count; i += lanes)
         trace_photon_packet(frame, first + i, to + i, faces + i, lane_numbers() < Int(static_cast<int>(count - i)));
 }
 
-void accumulate_row(const Frame &frame, const Layer &layer, std::int32_t row) {
-    accumulate(frame, layer, row);
-}
+} // namespace
 
-void filter_row(const Frame &frame, const Layer &layer, std::int32_t row, int pass) {
-    filter(frame, layer, row, pass);
-}
-
-void find_taps(const Frame &frame, const Tile &tile) {
-    find_taps_of(frame, tile);
-}
-
-Rectangle resolve_row(const Frame &frame, std::int32_t row) {
-    return resolve(frame, row);
+Kernel kernel() {
+    return {render<Whitted>, render<Path>, trace_photons,          find_change, accumulate, filter,
+            find_taps,       resolve,      ARHOST_TEXT(ARHOST_ISA)};
 }
 
 } // namespace rt_embree::ARHOST_ISA

@@ -248,6 +248,12 @@ ARHOST_INLINE Vec3 relative_change(const Frame &frame, const Surface &s, Vec3 ir
     return {ratio(irradiance.x), ratio(irradiance.y), ratio(irradiance.z)};
 }
 
+// Returns whether an image shows a part of the change of a catcher's light.
+ARHOST_INLINE bool shows(const Frame &frame, View part) {
+    const bool is_part = frame.view == View::shadow || frame.view == View::bounce || frame.view == View::caustics;
+    return !is_part || frame.view == part;
+}
+
 // Adds the change of a catcher's light, relative to its light without virtual objects. Of its gloss, adds the light
 // that virtual objects add and remove in absolute terms.
 ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRayHit16 &rays, const Bool &active) {
@@ -274,7 +280,9 @@ ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRay
         mirrored = mirrored + select(of & sample.is_virtual, light, black());
         covered = covered + select(of & ~sample.is_virtual, light, black());
     };
-    const Vec3 change = sampled_change(work, paths, s, form_factors, frame.light_samples, active, add_to_gloss);
+    Vec3 change = black();
+    if (shows(frame, View::shadow))
+        change = sampled_change(work, paths, s, form_factors, frame.light_samples, active, add_to_gloss);
     // Rays of the gloss do not see lamps behind mirrors and glass.
     const PhotonLight by_photons = photon_light(
         work, paths, s, active, [&](Vec3 power, Vec3 to_light) __attribute__((always_inline)) {
@@ -300,7 +308,8 @@ ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRay
         enqueue(work, of_gloss, s, ray,
                 mirrors & can_meet_virtual(frame.path, s.position, ray.direction, Float(far_away)));
     }
-    enqueue_bounce(work, relative, s, form_factors, relative.throughput, 1, active);
+    if (shows(frame, View::bounce))
+        enqueue_bounce(work, relative, s, form_factors, relative.throughput, 1, active);
 }
 
 // The point of the picture that shows a direction: px, texel centres at halves.

@@ -221,6 +221,38 @@ TEST(Quality, DeterminesSamplesAndDenoising) {
     }
 }
 
+TEST(Show, RendersPartsOfThePicture) {
+    constexpr std::uint64_t frames = 4;
+    const auto shown = [](const std::string &part) { // the colour of a far point of the table
+        LinearTracer tracer(with_mirror_and_glass(), {{"quality", "realtime"}, {"show", part}}, "rt_embree");
+        EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+        for (std::uint64_t i = 1; i < frames; ++i)
+            tracer.render(turned(0), i);
+        const LinearPicture picture = tracer.render(turned(0), frames);
+        constexpr std::uint32_t x = 10, y = height - 10;
+        EXPECT_EQ(picture.value(x, y, 4), 0); // the transmittance
+        return glm::vec3(picture.value(x, y, 0), picture.value(x, y, 1), picture.value(x, y, 2));
+    };
+    const auto near = [](glm::vec3 a, glm::vec3 b) { return glm::distance(a, b) < 0.04f; };
+    EXPECT_PRED2(near, shown("normals"), glm::vec3(0.5, 0.5, 1));
+    EXPECT_PRED2(near, shown("history"), glm::vec3(frames / 32.0f));
+    EXPECT_PRED2(near, shown("shadow"), glm::vec3(0.5));
+    EXPECT_PRED2(near, shown("bounce"), glm::vec3(0));
+    EXPECT_PRED2(near, shown("caustics"), glm::vec3(0));
+}
+
+TEST(Show, NeedsDenoising) {
+    PluginUnderTest plugin("rt_embree");
+    EXPECT_EQ(plugin.create({{"quality", "reference"}, {"show", "normals"}}), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(plugin.log().find("option 'show': 'normals' is a view of the denoiser"), std::string::npos)
+        << plugin.log();
+
+    SceneBuilder whitted;
+    whitted.add_ball("ball", {0, 0, 25, 25}, diffuse(0.7f, 0.2f, 0.1f));
+    Tracer tracer(std::move(whitted), {{"quality", "realtime"}, {"show", "normals"}});
+    EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_ERROR_UNSUPPORTED);
+}
+
 // Light from the side, or that a mirror throws, changes the table far away from the objects.
 struct FarChange {
     const char *name;
@@ -308,31 +340,63 @@ TEST_P(DenoisingOfCaustics, LoseNoLight) {
     EXPECT_NEAR(light / expected, 1, 0.08);
 }
 
-// After five frames, nothing is left of where a ball and its shadow were.
-TEST(DenoisingOfMotion, ForgetsWhatHasMoved) {
+// A cube that moves over a table, or a lamp that rises through it.
+struct Moving {
+    const char *name;
+    arhost_material material;
+    glm::vec3 before;
+};
+arhost_material glowing() {
+    arhost_material material = metallic_roughness({0, 0, 0}, 0, 1);
+    material.emission[0] = material.emission[1] = material.emission[2] = 8;
+    return material;
+}
+class DenoisingOfMotion : public testing::TestWithParam<Moving> {};
+
+INSTANTIATE_TEST_SUITE_P(Objects, DenoisingOfMotion,
+                         testing::Values(Moving{"cube", diffuse(0.7f, 0.2f, 0.1f), {-60, 0, 20}},
+                                         Moving{"lamp", glowing(), {0, 0, -200}}),
+                         [](const auto &of) { return std::string(of.param.name); });
+
+// After five frames, nothing is left of the light before.
+TEST_P(DenoisingOfMotion, ForgetsWhatHasMoved) {
     const auto make = [] {
         scene::Settings settings = path_traced(0.4f);
         settings.duration_s = 1;
         SceneBuilder scene(settings);
         scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
-        const scene::Motion motion{.moves = true, .node = scene.add_moving_node({-60, 0, 20}, {60, 0, 20})};
-        scene.add_animated("cube", cube(20), diffuse(0.7f, 0.2f, 0.1f), motion);
+        const scene::Motion motion{
+            .moves = true,
+            .node = scene.add_moving_node(GetParam().before, -GetParam().before + 2.0f * glm::vec3(0, 0, 20))};
+        scene.add_animated("cube", cube(20), GetParam().material, motion);
         scene.add_light(bulb({0, -100, 250}, 40, 6e4f, ARHOST_FALLOFF_INVERSE_SQUARE));
         return scene;
     };
-    LinearTracer tracer(make(), denoised, "rt_embree");
-    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
-    for (std::uint64_t i = 0; i < 16; ++i)
-        tracer.render(turned(0), i, nullptr, 0.0);
-    LinearPicture picture = tracer.render(turned(0), 16, nullptr, 0.5);
-    for (std::uint64_t i = 17; i < 22; ++i)
-        picture = tracer.render(turned(0), i, nullptr, 0.5);
+    const auto picture_after = [&](std::uint64_t frames_before) {
+        LinearTracer tracer(make(), denoised, "rt_embree");
+        EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+        for (std::uint64_t i = 0; i < frames_before; ++i)
+            tracer.render(turned(0), i, nullptr, 0.0);
+        for (std::uint64_t i = frames_before; i < frames_before + 5; ++i)
+            tracer.render(turned(0), i, nullptr, 0.5);
+        return tracer.render(turned(0), frames_before + 5, nullptr, 0.5);
+    };
+    const LinearPicture picture = picture_after(16), fresh = picture_after(0);
     const LinearPicture truth = picture_of(make(), converged, turned(0), 0.5),
                         past = picture_of(make(), converged, turned(0), 0.0);
-    const auto has_been_shadowed = [&](std::uint32_t x, std::uint32_t y) {
-        return past.value(x, y, 4) < truth.value(x, y, 4) - 0.1f;
-    };
-    EXPECT_LT(difference(picture, truth, has_been_shadowed), 0.1 * difference(past, truth, has_been_shadowed));
+    constexpr std::size_t transmittance = 4;
+    double remaining = 0, change = 0;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x) {
+            const auto value = [&](const LinearPicture &of) { return double{of.value(x, y, transmittance)}; };
+            if (value(past) < 0.2 || value(truth) < 0.2 || std::abs(value(truth) - value(past)) < 0.05)
+                continue; // a cube, or no change
+            const double sign = value(truth) > value(past) ? 1 : -1;
+            remaining += sign * (value(fresh) - value(picture));
+            change += sign * (value(truth) - value(past));
+        }
+    ASSERT_GT(change, 100);
+    EXPECT_LT(std::abs(remaining), 0.05 * change);
 }
 
 } // namespace
