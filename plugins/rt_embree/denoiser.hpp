@@ -11,6 +11,7 @@
 
 #include <arhost/raytracer.h>
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,12 @@ namespace rt_embree {
 struct StateSlots {
     const void *before = nullptr;
     void *after = nullptr;
+
+    // Returns the parts of the states from `offset` bytes on.
+    StateSlots from(std::uint64_t offset) const {
+        return {before ? static_cast<const std::byte *>(before) + offset : nullptr,
+                after ? static_cast<std::byte *>(after) + offset : nullptr};
+    }
 };
 
 class Denoiser {

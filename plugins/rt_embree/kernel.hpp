@@ -215,6 +215,23 @@ struct PathScene {
     Photons photons;
 };
 
+// Memory of the video, for mirrors and glass: the light of points of a flat catcher, and of directions in which
+// there is no real surface.
+struct Surroundings {
+    // Texels. The rows from plane_height on are directions in world axes, in equirectangular projection.
+    static constexpr std::int32_t width = 256, plane_height = 256, height = 384;
+    // Rows of texels: the light (three), and how certain it still is, from 0 to 1.
+    static constexpr int certainty_row = 3, row_count = 4;
+    // The certainty is halved after 140 frames.
+    static constexpr float kept_per_frame = 0.995f, least_certainty = 1 / 64.0f;
+    const float *before[row_count]; // NULL: nothing is known
+    float *after[row_count];
+    std::int32_t catcher; // its index in Scene::objects; −1: none
+    std::int32_t axes[2]; // world axes of the plane
+    // Coordinate of the plane along the third axis; the first texel's corner, and the sides of texels, along `axes`.
+    float plane_mm, low[2], texel_mm[2];
+};
+
 struct Camera {
     float eye[3];
     float world_from_camera[9]; // column-major
@@ -326,8 +343,9 @@ struct Frame {
     std::uint16_t *linear;
     std::uint32_t first_random; // offset into the random sequences of the path integrator
     PathScene path;
-    const Denoising *denoising; // NULL: off
-    View view;                  // the picture if `denoising` is NULL
+    const Denoising *denoising;       // NULL: off
+    const Surroundings *surroundings; // NULL: the video before is not known
+    View view;                        // the picture if `denoising` is NULL
     bool blends_codes; // straight images of the path integrator: the host blends sRGB codes, not linear light
     // Called on any thread after each sample of a tile and before each chunk of photons, because a tile may take
     // seconds. Reports progress; returns whether the image is still wanted.
@@ -399,12 +417,15 @@ using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint
 using DenoiseRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row);
 using FilterRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
 using DenoiseTile = void (*)(const Frame &frame, const Tile &tile);
+// Updates a row of Frame::surroundings.
+using RememberRow = void (*)(const Frame &frame, std::int32_t row);
 // Writes a row of the image. Returns the bounding rectangle of the pixels that virtual objects affect.
 using ResolveRow = Rectangle (*)(const Frame &frame, std::int32_t row);
 
 struct Kernel {
     RenderTile render_tile, render_path_tile;
     TracePhotons trace_photons;
+    RememberRow remember_row;
     DenoiseRow find_change, accumulate_row;
     FilterRow filter_row;
     DenoiseTile find_taps;

@@ -72,6 +72,16 @@ Rectangle united(const Rectangle &a, const Rectangle &b) {
     return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
 }
 
+// Whether objects show the video around them.
+bool shows_video(const EmbreeScene &scene) {
+    return std::ranges::any_of(std::span(scene.view().objects, scene.placed_objects().size()),
+                               [](const Object &object) {
+                                   const arhost_material_model model = object.material->model;
+                                   return object.role == ARHOST_ROLE_VIRTUAL &&
+                                          (model == ARHOST_MATERIAL_MIRROR || model == ARHOST_MATERIAL_GLASS);
+                               });
+}
+
 } // namespace
 
 Kernel choose_kernel(const std::string &instruction_set) {
@@ -141,6 +151,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         setup.scene->objects.count <= Denoising::most_objects)
         denoiser_.emplace(full_intrinsics_.width, full_intrinsics_.height, setup.scene->objects.count,
                           lights_->casts_sharp_shadows());
+    remembers_ = denoiser_ && setup.video_format && shows_video(scene_);
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
     if (settings.accumulate)
@@ -356,6 +367,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 first_random,
                 path_scene(),
                 nullptr,
+                nullptr,
                 View::picture,
                 blends_codes_,
                 [](const void *of) { return static_cast<const Progress *>(of)->goes_on(); },
@@ -368,6 +380,16 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         frame.denoising = &denoiser_->begin(
             state, intrinsics_, frame.camera, scene_.placed_objects(), motion && motion->deformed_count > 0,
             static_cast<std::uint32_t>(sequence), full_samples_, windows.wide_catcher());
+    }
+    std::optional<Surroundings> surroundings;
+    if (frame.denoising && remembers_) {
+        frame.surroundings = &surroundings.emplace(
+            surroundings_in(state.from(denoiser_->state_size()), scene_, windows.wide_catcher()));
+        constexpr std::int32_t rows = 16;
+        threads_.for_each(Surroundings::height / rows, [&](std::size_t i, std::size_t) {
+            for (std::int32_t row = 0; row < rows; ++row)
+                kernel_.remember_row(frame, static_cast<std::int32_t>(i) * rows + row);
+        });
     }
     if (frame.denoising && finds_unchanged() && view_ == View::picture)
         frame.path.wide_catcher = windows.wide_catcher();

@@ -9,6 +9,7 @@
 #include "ray_table.hpp"
 #include "raytracer_common/photon_map.hpp"
 #include "raytracer_common/video.hpp"
+#include "surroundings.hpp"
 #include "thread_pool.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -56,7 +57,9 @@ public:
     // without it, there is no denoising.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr,
                      const arhost_frame *video = nullptr, std::uint64_t sequence = 0, const StateSlots &state = {});
-    std::uint64_t state_size() const { return denoiser_ ? denoiser_->state_size() : 0; }
+    std::uint64_t state_size() const {
+        return (denoiser_ ? denoiser_->state_size() : 0) + (remembers_ ? surroundings_state_size() : 0);
+    }
     const EmbreeScene &scene() const { return scene_; }
     // Both functions change the images of later calls as if the renderer had been created with the new setting.
     // `full_samples`: number of samples of an image without a limit (arhost_render_request.max_samples).
@@ -107,6 +110,7 @@ private:
     bool has_video_ = false; // of the current frame
     float max_radius_squared_;
     std::optional<Denoiser> denoiser_; // empty without denoising
+    bool remembers_ = false;           // whether the state contains the surroundings, after the denoiser's part
 
     // State of the option `accumulate`.
     std::vector<float> history_;                  // sums of the samples so far; empty if the option is off

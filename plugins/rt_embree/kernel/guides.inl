@@ -88,7 +88,7 @@ ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction
             }
         });
         if (any(arrived)) {
-            const Filmed filmed = filmed_surface(frame, s, arrived & s.is_real);
+            const Filmed filmed = filmed_surface(frame, rays.hit, s, arrived & s.is_real);
             const Vec3 albedo = select(filmed.inside, filmed.light, divisor_of(s)) * throughput;
             const auto least = [](Float a) __attribute__((always_inline)) {
                 return max(a, Float(1.0f / 64));

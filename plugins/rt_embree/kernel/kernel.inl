@@ -301,8 +301,8 @@ void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
 } // namespace
 
 Kernel kernel() {
-    return {render<Whitted>, render<Path>, trace_photons,          find_change, accumulate, filter,
-            find_taps,       resolve,      ARHOST_TEXT(ARHOST_ISA)};
+    return {render<Whitted>, render<Path>, trace_photons, remember, find_change,
+            accumulate,      filter,       find_taps,     resolve,  ARHOST_TEXT(ARHOST_ISA)};
 }
 
 } // namespace rt_embree::ARHOST_ISA

@@ -113,7 +113,7 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
         active = active & ~(s.is_real & sees_only_virtual(paths));
     paths.pixel = paths.pixel & Int(filmed_bit - 1);
     if (paths.depth > 0 && any(active & s.is_real))
-        active = active & ~add_filmed(work, s, paths, active & s.is_real);
+        active = active & ~add_filmed(work, rays.hit, s, paths, active & s.is_real);
     if (!any(active))
         return;
     if (paths.depth == 1)

@@ -2,7 +2,7 @@
 //
 // Real surfaces: how virtual objects change the light of catchers, and what the video shows of them.
 #pragma once
-#include "path_lights.inl"
+#include "filmed.inl"
 #include "photons.inl"
 
 // Returns paths whose radiance is added to another plane. The planes also have different random numbers.
@@ -312,66 +312,11 @@ ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRay
         enqueue_bounce(work, relative, s, form_factors, relative.throughput, 1, active);
 }
 
-// The point of the picture that shows a direction: px, texel centres at halves.
-struct PixelOf {
-    Float x, y;
-    Bool in_front; // of the camera, where its lens model is valid
-};
-// `to_point`: from the camera's eye, in world axes.
-ARHOST_INLINE PixelOf pixel_towards(const Video &video, const Camera &camera, Vec3 to_point) {
-    const float *m = camera.world_from_camera;
-    const Vec3 p{dot(splat(m), to_point), dot(splat(m + 3), to_point), dot(splat(m + 6), to_point)};
-    const Float depth = max(p.z, Float(1e-6f));
-    Vec3 at = vec3(p.x / depth, p.y / depth, Float(1.0f));
-    const float *k = video.coefficients;
-    const Bool in_front = (p.z > Float(1e-6f)) & (at.x * at.x + at.y * at.y < Float(video.max_radius_squared));
-    if (video.distortion == ARHOST_DISTORTION_BROWN)
-        at = brown_conrady({k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11]}, at);
-    else if (video.distortion == ARHOST_DISTORTION_FISHEYE)
-        at = kannala_brandt({k[0], k[1], k[2], k[3]}, at);
-    return {at.x * Float(video.fx) + Float(video.cx + 0.5f), at.y * Float(video.fy) + Float(video.cy + 0.5f),
-            in_front};
-}
-
-// The light of the video in some direction.
-struct Filmed {
-    Bool inside; // the video shows this direction
-    Vec3 light;
-};
-// `to_point`: from the camera's eye, in world axes.
-ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
-    const Video &video = frame.path.video;
-    const PixelOf pixel = pixel_towards(video, frame.camera, to_point);
-    const Float x = pixel.x, y = pixel.y;
-    const Float width(static_cast<float>(video.image.width)), height(static_cast<float>(video.image.height));
-    const Bool inside = pixel.in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
-    if (!any(inside))
-        return {inside, black()};
-    return {inside, sample_texture(frame.scene, video.image, x / width, y / height).colour};
-}
-
-// Returns the light of real surfaces that the video shows. `inside`: the lanes in which it shows them.
-ARHOST_INLINE Filmed filmed_surface(const Frame &frame, const Surface &s, Bool active) {
-    if (!frame.path.video.image.texels || !any(active))
-        return {bool_of(false), black()};
-    const Vec3 eye = splat(frame.camera.eye), to_point = s.position - eye;
-    Filmed filmed = filmed_towards(frame, to_point);
-    // The video shows the side of the surface that faces the camera.
-    filmed.inside = active & filmed.inside & (dot(s.geometric_normal, to_point) < Float(0.0f));
-    if (frame.scene.has_several_real && any(filmed.inside)) { // the video shows a nearer real surface
-        RTCRay16 ray;
-        const Float end = Float(1.0f) - s.offset * Float(4.0f) / max(length(to_point), Float(1e-20f));
-        set_ray(ray, eye, to_point, end, Int(real_masks));
-        filmed.inside = filmed.inside & ~blocked(frame.scene, ray, filmed.inside);
-    }
-    return filmed;
-}
-
 // Adds the light of real surfaces that the video shows, as virtual objects change it. Returns the lanes whose light
 // it has added.
-ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, Bool active) {
+ARHOST_INLINE Bool add_filmed(Work &work, const RTCHit16 &hit, const Surface &s, const Paths &paths, Bool active) {
     const Frame &frame = work.frame;
-    const Filmed filmed = filmed_surface(frame, s, active);
+    const Filmed filmed = filmed_surface(frame, hit, s, active);
     active = filmed.inside;
     if (!any(active))
         return active;
@@ -401,13 +346,16 @@ ARHOST_INLINE Vec3 environment_towards(const Work &work, const Paths &paths, Vec
     const Bool is_specular = active & (paths.inverse_density == Float(0.0f)) & ~changes_catcher(paths);
     if (frame.path.video.image.texels && any(is_specular)) {
         const Filmed filmed = filmed_towards(frame, direction);
-        Bool seen =
-            is_specular & filmed.inside & (largest(filmed.light) < Float(0.95f)); // the video is not saturated
+        Bool seen = is_specular & filmed.inside & (largest(filmed.light) < Float(saturated_video));
         if (any(seen)) {
             RTCRay16 ray;
             set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(real_masks));
             seen = seen & ~blocked(frame.scene, ray, seen);
             light = select(seen, filmed.light, light);
+        }
+        if (const Bool unseen = is_specular & ~seen; frame.surroundings && any(unseen)) {
+            const Remembered remembered = remembered_towards(*frame.surroundings, direction, unseen);
+            light = light + (remembered.light - light) * remembered.certainty;
         }
     }
     const Bool weighted = paths.inverse_density > Float(0.0f); // light samples do not follow mirrors and glass
@@ -429,7 +377,7 @@ ARHOST_INLINE void add_covered(Work &work, const Paths &paths, const RTCRay16 &r
     Vec3 light = environment_towards(work, paths, direction, active & ~hit);
     if (any(hit)) {
         const Surface s = surface_at(frame.scene, behind, hit);
-        const Filmed filmed = filmed_surface(frame, s, hit);
+        const Filmed filmed = filmed_surface(frame, behind.hit, s, hit);
         light = select(
             hit, select(filmed.inside, filmed.light, s.emission + s.diffuse * irradiance_without_objects(frame, s)),
             light);

@@ -221,6 +221,35 @@ TEST(Quality, DeterminesSamplesAndDenoising) {
     }
 }
 
+// A mirror shows a part of the table that an earlier picture showed, and later less of it.
+TEST(Surroundings, StayVisibleInMirrors) {
+    const auto make = [] {
+        SceneBuilder scene(path_traced(0.4f));
+        scene.add_mesh("table", square(1000), diffuse(0.02f, 0.02f, 0.02f), ARHOST_ROLE_CATCHER);
+        scene.add_mesh("mirror", quad({-80, 100, 1}, {80, 100, 1}, {80, 100, 100}, {-80, 100, 100}), mirror(1));
+        return scene;
+    };
+    constexpr std::uint8_t code = 200;
+    constexpr double of_video = 0.578, of_table = 0.02 * 0.4; // linear light
+    const arhost_camera far = camera({0, -400, 400}, {0, -100, 0}, {0, 0, 1}),
+                        near = camera({0, -60, 60}, {0, 100, 50}, {0, 0, 1});
+    const Video video(far.intrinsics, code);
+    const auto mirrored =
+        [](const LinearPicture &picture) { // the table behind the near camera, 180 mm from the mirror
+            return double{picture.value(width / 2, height / 2 + 11, 1)};
+        };
+    LinearTracer tracer(make(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(far.intrinsics, &video), ARHOST_STATUS_OK) << tracer.log();
+    EXPECT_NEAR(mirrored(tracer.render(near, 0, &video)), of_table, 0.02);
+    tracer.render(far, 1, &video);
+    EXPECT_NEAR(mirrored(tracer.render(near, 2, &video)), of_video, 0.02);
+    for (std::uint64_t i = 3; i < 70; ++i)
+        tracer.render(near, i, &video);
+    const double later = mirrored(tracer.render(near, 70, &video));
+    EXPECT_LT(later, 0.9 * of_video);
+    EXPECT_GT(later, 0.5 * of_video);
+}
+
 TEST(Show, RendersPartsOfThePicture) {
     constexpr std::uint64_t frames = 4;
     const auto shown = [](const std::string &part) { // the colour of a far point of the table

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The light of real surfaces and surroundings that the video shows, or has shown (Surroundings in kernel.hpp).
+#pragma once
+#include "path_lights.inl"
+
+// The point of the picture that shows a direction: px, texel centres at halves.
+struct PixelOf {
+    Float x, y;
+    Bool in_front; // of the camera, where its lens model is valid
+};
+// `to_point`: from the camera's eye, in world axes.
+ARHOST_INLINE PixelOf pixel_towards(const Video &video, const Camera &camera, Vec3 to_point) {
+    const float *m = camera.world_from_camera;
+    const Vec3 p{dot(splat(m), to_point), dot(splat(m + 3), to_point), dot(splat(m + 6), to_point)};
+    const Float depth = max(p.z, Float(1e-6f));
+    Vec3 at = vec3(p.x / depth, p.y / depth, Float(1.0f));
+    const float *k = video.coefficients;
+    const Bool in_front = (p.z > Float(1e-6f)) & (at.x * at.x + at.y * at.y < Float(video.max_radius_squared));
+    if (video.distortion == ARHOST_DISTORTION_BROWN)
+        at = brown_conrady({k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11]}, at);
+    else if (video.distortion == ARHOST_DISTORTION_FISHEYE)
+        at = kannala_brandt({k[0], k[1], k[2], k[3]}, at);
+    return {at.x * Float(video.fx) + Float(video.cx + 0.5f), at.y * Float(video.fy) + Float(video.cy + 0.5f),
+            in_front};
+}
+
+// Above this, the video is saturated: the light may be brighter.
+constexpr float saturated_video = 0.95f;
+
+// The light of the video in some direction.
+struct Filmed {
+    Bool inside; // the video shows this direction
+    Vec3 light;
+};
+// `to_point`: from the camera's eye, in world axes.
+ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
+    const Video &video = frame.path.video;
+    const PixelOf pixel = pixel_towards(video, frame.camera, to_point);
+    const Float x = pixel.x, y = pixel.y;
+    const Float width(static_cast<float>(video.image.width)), height(static_cast<float>(video.image.height));
+    const Bool inside = pixel.in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
+    if (!any(inside))
+        return {inside, black()};
+    return {inside, sample_texture(frame.scene, video.image, x / width, y / height).colour};
+}
+
+// As filmed_surface(), of the present only. `offset`: mm.
+ARHOST_INLINE Filmed filmed_now(const Frame &frame, Vec3 position, Vec3 geometric_normal, Float offset, Bool active) {
+    if (!frame.path.video.image.texels || !any(active))
+        return {bool_of(false), black()};
+    const Vec3 eye = splat(frame.camera.eye), to_point = position - eye;
+    Filmed filmed = filmed_towards(frame, to_point);
+    // The video shows the side of the surface that faces the camera.
+    filmed.inside = active & filmed.inside & (dot(geometric_normal, to_point) < Float(0.0f));
+    if (frame.scene.has_several_real && any(filmed.inside)) { // the video shows a nearer real surface
+        RTCRay16 ray;
+        const Float end = Float(1.0f) - offset * Float(4.0f) / max(length(to_point), Float(1e-20f));
+        set_ray(ray, eye, to_point, end, Int(real_masks));
+        filmed.inside = filmed.inside & ~blocked(frame.scene, ray, filmed.inside);
+    }
+    return filmed;
+}
+
+// The light that the video has shown, and how certain it still is, from 0 to 1.
+struct Remembered {
+    Vec3 light;
+    Float certainty;
+};
+// `x`, `y`: texel centres at halves. `first`, `height`: rows of Surroundings.
+ARHOST_INLINE Remembered remembered_at(const Surroundings &from, Float x, Float y, int first, int height, bool wraps,
+                                       Bool active) {
+    Remembered sum{black(), Float(0.0f)};
+    if (!from.before[0])
+        return sum;
+    const Float left = floor(x - Float(0.5f)), top = floor(y - Float(0.5f));
+    const Float along = x - Float(0.5f) - left, down = y - Float(0.5f) - top;
+    const auto limited = [](Float a, int size) __attribute__((always_inline)) {
+        return to_int(min(max(a, Float(0.0f)), Float(static_cast<float>(size - 1))));
+    };
+    for (int i = 0; i < 4; ++i) {
+        const Float column = left + Float(static_cast<float>(i & 1));
+        const Int texel_column = wraps ? to_int(column) & Int(Surroundings::width - 1)
+                                       : limited(column, Surroundings::width);
+        const Int row = limited(top + Float(static_cast<float>(i >> 1)), height) + Int(first);
+        const Int texel = select(active, row * Int(Surroundings::width) + texel_column, Int(0));
+        const Float weight = (i & 1 ? along : Float(1.0f) - along) * (i >> 1 ? down : Float(1.0f) - down) *
+                             gather(from.before[Surroundings::certainty_row], texel);
+        const Vec3 light{gather(from.before[0], texel), gather(from.before[1], texel), gather(from.before[2], texel)};
+        sum.light = sum.light + light * weight;
+        sum.certainty = sum.certainty + weight;
+    }
+    sum.certainty = select(active, sum.certainty, Float(0.0f));
+    sum.light = sum.light * (Float(1.0f) / max(sum.certainty, Float(1e-6f)));
+    return sum;
+}
+ARHOST_INLINE Remembered remembered_towards(const Surroundings &from, Vec3 direction, Bool active) {
+    constexpr int height = Surroundings::height - Surroundings::plane_height;
+    const Vec3 d = normalize(direction);
+    return remembered_at(from, equirectangular_u(d) * Float(static_cast<float>(Surroundings::width)),
+                         equirectangular_v(d) * Float(static_cast<float>(height)), Surroundings::plane_height, height,
+                         true, active);
+}
+// Of points of the flat catcher.
+ARHOST_INLINE Remembered remembered_on_plane(const Surroundings &from, Vec3 position, Bool active) {
+    const auto texel = [&](int i) __attribute__((always_inline)) {
+        const int axis = from.axes[i];
+        const Float at = axis == 0 ? position.x : axis == 1 ? position.y : position.z;
+        return (at - Float(from.low[i])) * Float(1 / from.texel_mm[i]);
+    };
+    const Float x = texel(0), y = texel(1);
+    const Bool inside = active & (x > Float(0.0f)) & (x < Float(static_cast<float>(Surroundings::width))) & (y > Float(0.0f)) &
+                        (y < Float(static_cast<float>(Surroundings::plane_height)));
+    return remembered_at(from, x, y, 0, Surroundings::plane_height, false, inside);
+}
+
+// Returns the light of real surfaces that the video shows or has shown. `inside`: the lanes in which it does. What is
+// remembered fades into the light of the surface's material.
+ARHOST_INLINE Filmed filmed_surface(const Frame &frame, const RTCHit16 &hit, const Surface &s, Bool active) {
+    Filmed filmed = filmed_now(frame, s.position, s.geometric_normal, s.offset, active);
+    if (!frame.surroundings)
+        return filmed;
+    const Surroundings &surroundings = *frame.surroundings;
+    const Bool outside =
+        active & ~filmed.inside & (object_number(frame.scene, hit) == Int(surroundings.catcher));
+    if (!any(outside))
+        return filmed;
+    const Remembered remembered = remembered_on_plane(surroundings, s.position, outside);
+    const Bool known = outside & (remembered.certainty > Float(Surroundings::least_certainty));
+    if (!any(known))
+        return filmed;
+    const Vec3 unknown = s.emission + s.diffuse * irradiance_without_objects(frame, s);
+    const Vec3 light = unknown + (remembered.light - unknown) * remembered.certainty;
+    return {filmed.inside | known, select(known, light, filmed.light)};
+}
+
+// Updates a row of Frame::surroundings with the video.
+ARHOST_INLINE void remember(const Frame &frame, std::int32_t row) {
+    const Surroundings &surroundings = *frame.surroundings;
+    const bool of_plane = row < Surroundings::plane_height;
+    for (int x = 0; x < Surroundings::width; x += lanes) {
+        const Float column = to_float(lane_numbers() + Int(x)) + Float(0.5f);
+        Filmed filmed{bool_of(false), black()};
+        if (of_plane && surroundings.catcher >= 0) {
+            Float position[3];
+            position[surroundings.axes[0]] = Float(surroundings.low[0]) + column * Float(surroundings.texel_mm[0]);
+            position[surroundings.axes[1]] =
+                Float(surroundings.low[1] + (static_cast<float>(row) + 0.5f) * surroundings.texel_mm[1]);
+            const int normal_axis = 3 - surroundings.axes[0] - surroundings.axes[1];
+            position[normal_axis] = Float(surroundings.plane_mm);
+            // The side that faces the camera.
+            const Float side(frame.camera.eye[normal_axis] > surroundings.plane_mm ? 1.0f : -1.0f);
+            const auto component = [&](int axis) { return axis == normal_axis ? side : Float(0.0f); };
+            filmed = filmed_now(frame, {position[0], position[1], position[2]},
+                                {component(0), component(1), component(2)}, Float(surroundings.texel_mm[0] * 1e-3f),
+                                bool_of(true));
+        } else if (!of_plane) {
+            constexpr float height = Surroundings::height - Surroundings::plane_height;
+            const float v = (static_cast<float>(row - Surroundings::plane_height) + 0.5f) / height;
+            const Vec3 direction =
+                equirectangular_direction(column * Float(1.0f / Surroundings::width), Float(v));
+            filmed = filmed_towards(frame, direction);
+            filmed.inside = filmed.inside & (largest(filmed.light) < Float(saturated_video));
+            if (any(filmed.inside)) {
+                RTCRay16 ray;
+                set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(real_masks));
+                filmed.inside = filmed.inside & ~blocked(frame.scene, ray, filmed.inside);
+            }
+        }
+        const std::ptrdiff_t at = std::ptrdiff_t{Surroundings::width} * row + x;
+        Vec3 light = black();
+        Float certainty(0.0f);
+        if (surroundings.before[0]) {
+            light = {load(surroundings.before[0] + at), load(surroundings.before[1] + at),
+                     load(surroundings.before[2] + at)};
+            certainty = load(surroundings.before[Surroundings::certainty_row] + at);
+        }
+        // The mean of a few frames has less noise of the camera.
+        const Float share = select(certainty > Float(0.5f), Float(0.25f), Float(1.0f));
+        light = select(filmed.inside, light + (filmed.light - light) * share, light);
+        certainty = select(filmed.inside, Float(1.0f), certainty * Float(Surroundings::kept_per_frame));
+        store(surroundings.after[0] + at, light.x);
+        store(surroundings.after[1] + at, light.y);
+        store(surroundings.after[2] + at, light.z);
+        store(surroundings.after[Surroundings::certainty_row] + at, certainty);
+    }
+}
