@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace rt_embree {
 namespace {
@@ -60,20 +61,36 @@ void RayTable::fill(std::size_t tile, const arhost::shading::Lens &lens) {
     };
 
     const Rectangle &pixels = tiles_[tile].pixels;
+    const std::int32_t width = block * blocks_in(pixels.x1 - pixels.x0),
+                       height = block * blocks_in(pixels.y1 - pixels.y0);
+    // Directions at points that are (dx, dy) px from the centres of `columns` × `rows` pixels.
+    const auto grid = [&](std::int32_t columns, std::int32_t rows, double dx, double dy) {
+        std::vector<Direction> directions;
+        directions.reserve(static_cast<std::size_t>(columns) * rows);
+        for (std::int32_t row = 0; row < rows; ++row)
+            for (std::int32_t column = 0; column < columns; ++column)
+                directions.push_back(direction_at(pixels.x0 + column + dx, pixels.y0 + row + dy));
+        return directions;
+    };
+    const std::vector<Direction> centres = grid(width, height, 0, 0);
+    std::vector<Direction> sides, tops; // left sides of pixels and right ones of the last; likewise tops and bottoms
+    if (has_derivatives_) {
+        sides = grid(width + 1, height, -0.5, 0);
+        tops = grid(width, height + 1, 0, -0.5);
+    }
     float *to = blocks_.data() + tiles_[tile].first_block * rays().block_size();
-    for (std::int32_t y = pixels.y0; y < pixels.y1; y += block)
-        for (std::int32_t x = pixels.x0; x < pixels.x1; x += block, to += rays().block_size())
+    for (std::int32_t y = 0; y < height; y += block)
+        for (std::int32_t x = 0; x < width; x += block, to += rays().block_size())
             for (std::int32_t lane = 0; lane < lanes; ++lane) {
                 const std::int32_t column = x + lane % block, row = y + lane / block;
-                const double u = column, v = row;
-                const Direction centre = direction_at(u, v);
+                const std::size_t at = static_cast<std::size_t>(row) * width + column;
+                const Direction &centre = centres[at];
                 widen(centre);
                 store(centre, to + lane);
                 if (!has_derivatives_)
                     continue;
-                const Direction right = direction_at(u + 0.5, v), left = direction_at(u - 0.5, v);
-                const Direction below = direction_at(u, v + 0.5), above = direction_at(u, v - 0.5);
-                const Direction along_row = right - left, along_column = below - above;
+                const std::size_t left = at + row; // rows of `sides` have one more element
+                const Direction along_row = sides[left + 1] - sides[left], along_column = tops[at + width] - tops[at];
                 store(along_row, to + lane + lanes * dimensions_);
                 store(along_column, to + lane + 2 * lanes * dimensions_);
                 for (const double i : {-0.5, 0.5})

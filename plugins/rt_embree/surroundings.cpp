@@ -36,7 +36,8 @@ Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, 
             constexpr double most_mm = 2000; // farther away, texels are of little use
             const double side_mm = std::min<double>(width(axis), most_mm);
             header.low[i] = static_cast<float>((box.min[axis] + box.max[axis] - side_mm) / 2);
-            header.texel_mm[i] = static_cast<float>(side_mm / (i == 0 ? Surroundings::width : Surroundings::plane_height));
+            header.texel_mm[i] =
+                static_cast<float>(side_mm / (i == 0 ? Surroundings::width : Surroundings::plane_height));
         }
     }
     std::byte *const after = static_cast<std::byte *>(slots.after);

@@ -80,8 +80,8 @@ ARHOST_INLINE Remembered remembered_at(const Surroundings &from, Float x, Float 
     };
     for (int i = 0; i < 4; ++i) {
         const Float column = left + Float(static_cast<float>(i & 1));
-        const Int texel_column = wraps ? to_int(column) & Int(Surroundings::width - 1)
-                                       : limited(column, Surroundings::width);
+        const Int texel_column =
+            wraps ? to_int(column) & Int(Surroundings::width - 1) : limited(column, Surroundings::width);
         const Int row = limited(top + Float(static_cast<float>(i >> 1)), height) + Int(first);
         const Int texel = select(active, row * Int(Surroundings::width) + texel_column, Int(0));
         const Float weight = (i & 1 ? along : Float(1.0f) - along) * (i >> 1 ? down : Float(1.0f) - down) *
@@ -109,8 +109,8 @@ ARHOST_INLINE Remembered remembered_on_plane(const Surroundings &from, Vec3 posi
         return (at - Float(from.low[i])) * Float(1 / from.texel_mm[i]);
     };
     const Float x = texel(0), y = texel(1);
-    const Bool inside = active & (x > Float(0.0f)) & (x < Float(static_cast<float>(Surroundings::width))) & (y > Float(0.0f)) &
-                        (y < Float(static_cast<float>(Surroundings::plane_height)));
+    const Bool inside = active & (x > Float(0.0f)) & (x < Float(static_cast<float>(Surroundings::width))) &
+                        (y > Float(0.0f)) & (y < Float(static_cast<float>(Surroundings::plane_height)));
     return remembered_at(from, x, y, 0, Surroundings::plane_height, false, inside);
 }
 
@@ -121,8 +121,7 @@ ARHOST_INLINE Filmed filmed_surface(const Frame &frame, const RTCHit16 &hit, con
     if (!frame.surroundings)
         return filmed;
     const Surroundings &surroundings = *frame.surroundings;
-    const Bool outside =
-        active & ~filmed.inside & (object_number(frame.scene, hit) == Int(surroundings.catcher));
+    const Bool outside = active & ~filmed.inside & (object_number(frame.scene, hit) == Int(surroundings.catcher));
     if (!any(outside))
         return filmed;
     const Remembered remembered = remembered_on_plane(surroundings, s.position, outside);
@@ -151,14 +150,13 @@ ARHOST_INLINE void remember(const Frame &frame, std::int32_t row) {
             // The side that faces the camera.
             const Float side(frame.camera.eye[normal_axis] > surroundings.plane_mm ? 1.0f : -1.0f);
             const auto component = [&](int axis) { return axis == normal_axis ? side : Float(0.0f); };
-            filmed = filmed_now(frame, {position[0], position[1], position[2]},
-                                {component(0), component(1), component(2)}, Float(surroundings.texel_mm[0] * 1e-3f),
-                                bool_of(true));
+            filmed =
+                filmed_now(frame, {position[0], position[1], position[2]}, {component(0), component(1), component(2)},
+                           Float(surroundings.texel_mm[0] * 1e-3f), bool_of(true));
         } else if (!of_plane) {
             constexpr float height = Surroundings::height - Surroundings::plane_height;
             const float v = (static_cast<float>(row - Surroundings::plane_height) + 0.5f) / height;
-            const Vec3 direction =
-                equirectangular_direction(column * Float(1.0f / Surroundings::width), Float(v));
+            const Vec3 direction = equirectangular_direction(column * Float(1.0f / Surroundings::width), Float(v));
             filmed = filmed_towards(frame, direction);
             filmed.inside = filmed.inside & (largest(filmed.light) < Float(saturated_video));
             if (any(filmed.inside)) {
