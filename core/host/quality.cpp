@@ -9,6 +9,9 @@ namespace arhost::host {
 namespace {
 
 constexpr double scale_step = 0.84; // the resulting image has 0.7 times the pixels
+// Cost of an image of which a quarter of the pixels is shaded, relative to one that is shaded everywhere. Measured
+// with rt_embree: 0.58 to 0.62 where objects fill the picture, 0.86 where they cover a sixth of it.
+constexpr double cost_of_quarter_shading = 0.65;
 constexpr std::size_t min_images = 3;
 constexpr std::chrono::milliseconds window_length{500};
 constexpr int fast_windows_to_raise = 4, windows_to_confirm = 10;
@@ -24,15 +27,19 @@ constexpr double relief = 0.9;
 
 std::vector<Quality> levels_of(const QualityController::Limits &limits) {
     std::vector<Quality> levels = {{1, limits.max_samples}};
+    const auto add = [&](auto change) { change(levels.emplace_back(levels.back())); };
     while (levels.back().samples > std::max(limits.min_samples, 1u))
-        levels.push_back({1, std::max(levels.back().samples / 2, limits.min_samples)});
+        add([&](Quality &level) { level.samples = std::max(level.samples / 2, limits.min_samples); });
+    if (limits.max_shading_px >= 2)
+        add([](Quality &level) { level.shading_px = 2; });
     while (levels.back().scale > limits.min_scale)
-        levels.push_back({std::max(levels.back().scale * scale_step, limits.min_scale), levels.back().samples});
+        add([&](Quality &level) { level.scale = std::max(level.scale * scale_step, limits.min_scale); });
     return levels;
 }
 
 double cost(const Quality &quality) {
-    return quality.scale * quality.scale * std::max(quality.samples, 1u);
+    return quality.scale * quality.scale * std::max(quality.samples, 1u) *
+           (quality.shading_px > 1 ? cost_of_quarter_shading : 1);
 }
 
 } // namespace

@@ -12,12 +12,14 @@ namespace arhost::host {
 
 // The quality of one image.
 struct Quality {
-    double scale = 1;          // size of the image relative to the frame
-    std::uint32_t samples = 0; // maximum number per pixel; 0: no limit
+    double scale = 1;             // size of the image relative to the frame
+    std::uint32_t samples = 0;    // maximum number per pixel; 0: no limit
+    std::uint32_t shading_px = 1; // as in arhost_render_request, but never 0
     bool operator==(const Quality &) const = default;
 };
 
-// Chooses among levels of quality: first fewer samples, then smaller images. To prevent oscillation,
+// Chooses among levels of quality: first fewer samples, then fewer pixels that are shaded, then smaller images. To
+// prevent oscillation,
 // - a level is left only if the median time of half a second exceeds the time per frame; a better level is entered
 //   only if its predicted time stays well below the time per frame for two seconds;
 // - a better level that turned out to be too slow is entered again only when the time at the next lower level has
@@ -30,6 +32,7 @@ public:
         double target_fps = 0;
         double min_scale = 1;                           // 1: the scale is not adapted
         std::uint32_t min_samples = 0, max_samples = 0; // 0: samples are not adapted
+        std::uint32_t max_shading_px = 1;               // 1: all pixels are shaded
         bool operator==(const Limits &) const = default;
     };
 

@@ -136,7 +136,7 @@ FrameFlow::Intake Raytracer::intake() const {
 
 void Raytracer::render(Frame &frame) {
     if (parts_.flow.repeats_decisions(frame))
-        frame.quality = {frame.recorded->scale, frame.recorded->samples};
+        frame.quality = {frame.recorded->scale, frame.recorded->samples, frame.recorded->shading_px};
     else
         frame.quality = quality_ ? quality_->current() : Quality();
     Command command{};
@@ -147,6 +147,7 @@ void Raytracer::render(Frame &frame) {
     command.clock = frame.record.clock;
     command.time_s = 1e-9 * static_cast<double>(frame.record.capture_ns);
     command.max_samples = frame.quality.samples;
+    command.shading_px = frame.quality.shading_px;
     command.camera = frame.record.camera;
     if (frame.quality.scale < 1) {
         const auto [width, height] = overlay_size(parts_.video.format, frame.quality);
@@ -188,7 +189,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
         statistics.stages.add("device", device);
     if (const Frame *frame = parts_.flow.find(command.sequence); frame && quality_) {
         if (result.status >= 0) {
-            set_full_samples(result.render.full_samples);
+            set_adaptable({result.render.full_samples, result.render.coarsest_shading_px});
             statistics.quality_changes += quality_->add(frame->quality, busy, parts_.context.reactor.now());
         }
         statistics.quality = quality_->current();
@@ -204,6 +205,8 @@ void Raytracer::on_result(const Command &command, const Result &result) {
     frame->times.device = device;
     frame->record.overlay_scale = frame->quality.scale < 1 ? frame->quality.scale : 0;
     frame->record.overlay_samples = std::min(frame->quality.samples, result.render.full_samples);
+    const std::uint32_t shading_px = std::min(frame->quality.shading_px, result.render.coarsest_shading_px);
+    frame->record.overlay_shading_px = shading_px > 1 ? shading_px : 0;
     parts_.flow.on_rendered(*frame, busy);
     if (auto &checks = scene_->overlay_checks; checks && frame->quality.scale == 1) {
         const arhost_frame_format &format = parts_.video.format;
@@ -220,26 +223,28 @@ void Raytracer::start_quality() {
         return;
     const PluginDescription &plugin = component().description();
     if (std::exchange(adapted_plugin_, plugin.id) != plugin.id)
-        full_samples_.reset();
+        adaptable_.reset();
     const auto supports = [&](std::uint64_t capability) { return (plugin.capabilities & capability) != 0; };
     QualityController::Limits limits{.target_fps = run.target_fps};
     // If the worker warps the images because the plugin does not support lenses, they must have full size.
     if (supports(ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES) && !warps_images(plugin))
         limits.min_scale = run.min_scale;
-    limits.max_samples = full_samples_.value_or(0);
+    const Adaptable adaptable = adaptable_.value_or(Adaptable());
+    limits.max_samples = adaptable.full_samples;
     limits.min_samples = std::min(run.min_samples, limits.max_samples);
+    limits.max_shading_px = adaptable.coarsest_shading_px;
     if (!quality_ || quality_->limits() != limits)
         quality_.emplace(limits);
 }
 
-// `full_samples`: as in arhost_render_info. The first image of a plugin tells it, and an option may change it.
-void Raytracer::set_full_samples(std::uint32_t full_samples) {
-    const bool is_first = !full_samples_;
-    if (full_samples_ == full_samples)
+// The first image of a plugin tells what is adaptable, and an option may change it.
+void Raytracer::set_adaptable(const Adaptable &adaptable) {
+    const bool is_first = !adaptable_;
+    if (adaptable_ == adaptable)
         return;
-    full_samples_ = full_samples;
+    adaptable_ = adaptable;
     start_quality();
-    if (is_first && full_samples == 0 && quality_->is_lowest() && parts_.configuration.min_scale < 1)
+    if (is_first && adaptable == Adaptable() && quality_->is_lowest() && parts_.configuration.min_scale < 1)
         component().log(ARHOST_SEVERITY_WARNING, component().description().short_name() +
                                                      " can render neither smaller images nor fewer samples; "
                                                      "'live.target_fps' has no effect");

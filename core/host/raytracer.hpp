@@ -42,6 +42,12 @@ public:
     const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
 
 private:
+    // What a plugin reports in arhost_render_info.
+    struct Adaptable {
+        std::uint32_t full_samples = 0, coarsest_shading_px = 0;
+        bool operator==(const Adaptable &) const = default;
+    };
+
     supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) override;
     ipc::SlotLayout on_ready(const ipc::messages::Ready &ready) override;
     void on_running() override { start_quality(); }
@@ -50,7 +56,7 @@ private:
     bool warps_images(const model::PluginDescription &plugin) const;
     OverlayFormat choose_format(const model::PluginDescription &plugin) const;
     void start_quality();
-    void set_full_samples(std::uint32_t full_samples);
+    void set_adaptable(const Adaptable &adaptable);
     void write_anchors(const Frame &frame) const;
 
     const Configuration configuration_;
@@ -61,8 +67,7 @@ private:
     bool reads_video_ = false, has_state_ = false;
     std::optional<QualityController> quality_; // only with `live.target_fps`
     std::string adapted_plugin_;               // the plugin whose quality is adapted
-    std::optional<std::uint32_t>
-        full_samples_; // of that plugin, as in arhost_render_info; empty before the first image
+    std::optional<Adaptable> adaptable_;       // of that plugin; empty before the first image
 };
 
 } // namespace arhost::host

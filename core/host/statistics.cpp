@@ -164,6 +164,8 @@ Json quality_json(const Statistics &statistics) {
     Json json = {{"scale", statistics.quality->scale}, {"changes", statistics.quality_changes}};
     if (statistics.quality->samples > 0)
         json["samples"] = statistics.quality->samples;
+    if (statistics.quality->shading_px > 1)
+        json["shading_px"] = statistics.quality->shading_px;
     return json;
 }
 

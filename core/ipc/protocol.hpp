@@ -41,9 +41,9 @@ struct Command {
     std::uint32_t state_is_of_solver_only; // non-zero: another plugin wrote the plugin's part of the state
     double time_s;
     std::uint32_t max_samples; // render: as in arhost_render_request
+    std::uint32_t shading_px;  // likewise
     std::uint32_t video_generation;
     std::uint32_t video_slot;
-    std::uint32_t reserved;
     arhost_camera camera;
 };
 

@@ -169,8 +169,8 @@ constexpr Row remaining_keys[] = {
     {"live.max_latency_ms", integer, "500",
      "If tracking and tracing take longer than this, in ms, frames are shown without overlay."},
     {"live.target_fps", real, "0",
-     "If the ray tracer is too slow for this frame rate, it renders with fewer samples, then smaller images; 0: "
-     "never."},
+     "If the ray tracer is too slow for this frame rate, it renders with fewer samples, then shades fewer pixels, "
+     "then renders smaller images; 0: never."},
     {"live.min_scale", real, "0.5",
      "Smallest size of the images relative to the frame, 0.1 to 1; 1: never smaller images."},
     {"live.min_samples", integer, "1", "Smallest number of samples per pixel."},

@@ -128,6 +128,7 @@ template <class Archive, class Frame> void transfer(Archive &archive, Frame &fra
     archive(frame.overlay);
     archive(frame.scale);
     archive(frame.samples);
+    archive(frame.shading_px);
     archive.array(frame.targets, ARHOST_MAX_TARGETS, [&](auto &target) {
         archive(target.name);
         archive(target.state);
@@ -173,6 +174,8 @@ std::string problem_with(const RecordedFrame &frame, const RecordedFrame *before
         return "overlay: is out of range";
     if (!(frame.scale >= 0.01 && frame.scale <= 1))
         return "overlay_scale: must be 0.01 to 1";
+    if (frame.shading_px < 1 || frame.shading_px > 2)
+        return "overlay_shading_px: must be 1 or 2";
     for (const arhost_target &target : frame.targets)
         if (std::string problem = problem_with(target, frame.observations.size()); !problem.empty())
             return problem;

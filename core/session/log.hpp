@@ -26,8 +26,9 @@ struct RecordedFrame {
     std::int64_t capture_ns;
     arhost_clock clock;
     arhost_overlay overlay;
-    double scale;          // quality of the overlay, as in host::Quality
-    std::uint32_t samples; // samples per pixel, as in host::Quality
+    double scale;             // quality of the overlay, as in host::Quality
+    std::uint32_t samples;    // samples per pixel, as in host::Quality
+    std::uint32_t shading_px; // likewise
     std::vector<arhost_target> targets;
     std::vector<arhost_observation> observations; // observations of markers that belong to targets
     arhost_search search{};

@@ -360,6 +360,7 @@ public:
         arhost_render_request request{};
         request.struct_size = sizeof request;
         request.max_samples = command.max_samples;
+        request.shading_px = command.shading_px;
         request.sequence = command.sequence;
         request.time_s = command.time_s;
         request.camera = command.camera;

@@ -410,7 +410,7 @@ RENDER_INFO = _struct(40,
     ("region_height", "u4", 20),
     ("device_time_ns", "u8", 24),
     ("full_samples", "u4", 32),
-    ("reserved", "u4", 36))
+    ("coarsest_shading_px", "u4", 36))
 
 # arhost/sink.h
 SINK_CAPABILITY_NUMBERED_FILES = 1
@@ -451,4 +451,4 @@ RECORD = _struct(1256,
     ("search", SEARCH, 1152),
     ("expected", "u8", 1240),
     ("expected_count", "u4", 1248),
-    ("reserved", "u4", 1252))
+    ("overlay_shading_px", "u4", 1252))

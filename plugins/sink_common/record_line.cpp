@@ -156,6 +156,11 @@ void append_members(std::string &text, const arhost_record &record) {
         append_number(text, record.overlay_samples);
         text += ", ";
     }
+    if (record.overlay_shading_px > 0) {
+        text += "\"overlay_shading_px\": ";
+        append_number(text, record.overlay_shading_px);
+        text += ", ";
+    }
     text += "\"targets\": [";
     const char *separator = "";
     for (const arhost_target &target : arhost::elements(record.targets, record.target_count)) {

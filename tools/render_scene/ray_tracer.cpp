@@ -112,8 +112,8 @@ cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera
     const std::uint32_t stride = ipc::overlay_stride(width);
     const ImageMemory memory(std::size_t{stride} * height);
     const arhost_image image{sizeof image, stride, width, height, memory.get(), nullptr, nullptr};
-    arhost_render_request request{sizeof request, 0,       0,       time_s, camera, nullptr,
-                                  nullptr,        nullptr, nullptr, 0,      nullptr};
+    arhost_render_request request{sizeof request, 0,       0, time_s,  camera, nullptr, nullptr,
+                                  nullptr,        nullptr, 0, nullptr, 0,      0};
     arhost_motion motion;
     std::optional<arhost::scene::MotionEvaluator> evaluator; // owns the memory of `motion`
     if (scene.duration_s > 0) {

@@ -438,7 +438,7 @@ class RenderInfo:
     region_height: int
     device_time_ns: int
     full_samples: int
-    reserved: int
+    coarsest_shading_px: int
 
 # arhost/sink.h
 SINK_CAPABILITY_NUMBERED_FILES: int
@@ -481,7 +481,7 @@ class Record:
     search: Search
     expected: list[ExpectedMarker]
     expected_count: int
-    reserved: int
+    overlay_shading_px: int
 
 # The module
 

@@ -404,10 +404,11 @@ STRUCT(arhost_raytracer_setup, 48,
        FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(form, 12, 4) FIELD(scene, 16, 8)
        FIELD(intrinsics, 24, 8) FIELD(compositing, 32, 4) FIELD(reserved, 36, 4) FIELD(video_format, 40, 8))
 
-STRUCT(arhost_render_request, 448,
+STRUCT(arhost_render_request, 456,
        FIELD(struct_size, 0, 4) FIELD(max_samples, 4, 4) FIELD(sequence, 8, 8) FIELD(time_s, 16, 8)
        FIELD(camera, 24, 376) FIELD(motion, 400, 8) FIELD(video, 408, 8) FIELD(state_before, 416, 8)
-       FIELD(state_after, 424, 8) FIELD(state_size, 432, 8) FIELD(estimate, 440, 8))
+       FIELD(state_after, 424, 8) FIELD(state_size, 432, 8) FIELD(estimate, 440, 8) FIELD(shading_px, 448, 4)
+       FIELD(reserved, 452, 4))
 
 STRUCT(arhost_image, 40,
        FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(rgba, 16, 8)
@@ -416,7 +417,7 @@ STRUCT(arhost_image, 40,
 STRUCT(arhost_render_info, 40,
        FIELD(struct_size, 0, 4) FIELD(has_region, 4, 4) FIELD(region_x, 8, 4) FIELD(region_y, 12, 4)
        FIELD(region_width, 16, 4) FIELD(region_height, 20, 4) FIELD(device_time_ns, 24, 8) FIELD(full_samples, 32, 4)
-       FIELD(reserved, 36, 4))
+       FIELD(coarsest_shading_px, 36, 4))
 
 STRUCT(arhost_raytracer, 48,
        FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(start, 8, 8) FIELD(render, 16, 8) FIELD(stop, 24, 8)
@@ -448,7 +449,7 @@ STRUCT(arhost_record, 1256,
        FIELD(truth_target, 40, 64) FIELD(true_mt, 104, 128) FIELD(camera, 232, 376) FIELD(overlay_scale, 608, 8)
        FIELD(overlay_samples, 616, 4) FIELD(observation_count, 620, 4) FIELD(targets, 624, 8)
        FIELD(observations, 632, 8) FIELD(families, 640, 512) FIELD(search, 1152, 88) FIELD(expected, 1240, 8)
-       FIELD(expected_count, 1248, 4) FIELD(reserved, 1252, 4))
+       FIELD(expected_count, 1248, 4) FIELD(overlay_shading_px, 1252, 4))
 
 STRUCT(arhost_output, 80,
        FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(bgr, 16, 8)

@@ -31,7 +31,7 @@ std::string line(int frame, const std::string &more = R"("overlay": "none", "tar
            ", \"clock\": \"media\", " + more + ", \"video_end\": " + std::to_string(100 * (frame + 1)) + "}\n";
 }
 const std::string rendered =
-    R"("overlay": "rendered", "targets": [)"
+    R"("overlay": "rendered", "overlay_scale": 0.84, "overlay_samples": 3, "overlay_shading_px": 2, "targets": [)"
     R"({"name": "cup", "state": "detected", "age_frames": 0, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 4, 3, 2, 1], )"
     R"("covariance": [9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 8], )"
     R"("reprojection_px": 0.25, "ambiguity": 0.5, "observations": [{"id": 7, "corners_px": [[1, 2], [3, 2], [3, 4], [1, 4]], )"
@@ -91,6 +91,12 @@ TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
     EXPECT_EQ(full.capture_ns, 1000);
     EXPECT_EQ(full.clock, ARHOST_CLOCK_MEDIA);
     EXPECT_EQ(full.overlay, ARHOST_OVERLAY_RENDERED);
+    EXPECT_EQ(plain.scale, 1);
+    EXPECT_EQ(plain.samples, 0u);
+    EXPECT_EQ(plain.shading_px, 1u);
+    EXPECT_EQ(full.scale, 0.84);
+    EXPECT_EQ(full.samples, 3u);
+    EXPECT_EQ(full.shading_px, 2u);
     ASSERT_EQ(full.targets.size(), 2u);
     const arhost_target &cup = full.targets[0], &lid = full.targets[1];
     EXPECT_STREQ(cup.name, "cup");

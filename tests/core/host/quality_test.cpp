@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <vector>
 
 using namespace arhost::host;
 
@@ -13,9 +14,11 @@ namespace {
 
 using namespace std::chrono_literals;
 using Limits = QualityController::Limits;
-constexpr Limits full_limits{.target_fps = 30, .min_scale = 0.5, .min_samples = 1, .max_samples = 4};
+constexpr Limits full_limits{.target_fps = 30, .min_scale = 0.5, .min_samples = 1, .max_samples = 4},
+    with_shading{.target_fps = 30, .min_scale = 0.5, .min_samples = 1, .max_samples = 4, .max_shading_px = 2};
 
-// A ray tracer whose image takes fixed_ms + ms · scale² · samples, times a noise of ± `noise`.
+// A ray tracer whose image takes fixed_ms + ms · scale² · samples, times a noise of ± `noise`. Half of `ms` is for
+// shading.
 class Simulation {
 public:
     explicit Simulation(const Limits &limits) : controller(limits) {}
@@ -24,7 +27,9 @@ public:
         std::uniform_real_distribution<double> factor(1 - noise, 1 + noise);
         for (const auto end = now_ + duration; now_ < end;) {
             const Quality quality = controller.current();
-            last_ms = fixed_ms + ms * quality.scale * quality.scale * std::max(quality.samples, 1u);
+            const double shaded = 1.0 / (quality.shading_px * quality.shading_px);
+            last_ms =
+                fixed_ms + ms * quality.scale * quality.scale * std::max(quality.samples, 1u) * (0.5 + 0.5 * shaded);
             const auto time = std::chrono::duration_cast<std::chrono::nanoseconds>(
                 std::chrono::duration<double, std::milli>(last_ms * factor(random_)));
             now_ += std::max<std::chrono::nanoseconds>(time, 33ms); // the camera's rate
@@ -64,6 +69,35 @@ TEST(Quality, ReducesSamplesBeforeTheScale) {
     EXPECT_EQ(simulation.controller.current(), (Quality{1, 2}));
 }
 
+TEST(Quality, ReducesTheShadedPixelsBetweenSamplesAndScale) {
+    std::vector<Quality> levels{Quality{1, 4}};
+    Simulation simulation(with_shading);
+    for (double ms = 2; ms < 300; ms *= 1.02) {
+        simulation.run(2s, ms);
+        if (const Quality now = simulation.controller.current(); now != levels.back())
+            levels.push_back(now);
+    }
+    ASSERT_GE(levels.size(), 5u);
+    EXPECT_EQ(levels[1], (Quality{1, 2, 1}));
+    EXPECT_EQ(levels[2], (Quality{1, 1, 1}));
+    EXPECT_EQ(levels[3], (Quality{1, 1, 2}));
+    for (std::size_t i = 4; i < levels.size(); ++i) {
+        EXPECT_LT(levels[i].scale, levels[i - 1].scale);
+        EXPECT_EQ(levels[i].samples, 1u);
+        EXPECT_EQ(levels[i].shading_px, 2u) << "also in smaller images";
+    }
+    EXPECT_EQ(levels.back().scale, 0.5);
+    simulation.run(60s, 5);
+    EXPECT_EQ(simulation.controller.current(), (Quality{1, 4, 1}));
+}
+
+TEST(Quality, ShadesAQuarterOfThePixelsIfThatIsEnough) {
+    Simulation simulation({.target_fps = 30, .min_scale = 0.5, .max_shading_px = 2});
+    simulation.run(60s, 40); // 25 ms with a quarter
+    EXPECT_EQ(simulation.controller.current(), (Quality{1, 0, 2}));
+    EXPECT_EQ(simulation.controller.changes(), 1u);
+}
+
 TEST(Quality, StopsAtTheLimits) {
     Simulation simulation(full_limits);
     simulation.run(60s, 1000);
@@ -95,17 +129,18 @@ TEST(Quality, RecoversWhenTheLoadEnds) {
 }
 
 TEST(Quality, NeverOscillatesAtAConstantLoad) {
-    for (double ms = 2; ms < 400; ms *= 1.2)
-        for (const double fixed_ms : {0.0, 5.0, 20.0})
-            for (const double noise : {0.0, 0.1, 0.3}) {
-                Simulation simulation(full_limits);
-                simulation.run(20s, ms, fixed_ms, noise);
-                const std::uint64_t changes = simulation.controller.changes();
-                EXPECT_LE(changes, 6u) << ms << " ms + " << fixed_ms << " ms, noise " << noise;
-                simulation.run(600s, ms, fixed_ms, noise);
-                EXPECT_LE(simulation.controller.changes(), changes + 2)
-                    << ms << " ms + " << fixed_ms << " ms, noise " << noise;
-            }
+    for (const Limits &limits : {full_limits, with_shading})
+        for (double ms = 2; ms < 400; ms *= 1.2)
+            for (const double fixed_ms : {0.0, 5.0, 20.0})
+                for (const double noise : {0.0, 0.1, 0.3}) {
+                    Simulation simulation(limits);
+                    simulation.run(20s, ms, fixed_ms, noise);
+                    const std::uint64_t changes = simulation.controller.changes();
+                    EXPECT_LE(changes, 6u) << ms << " ms + " << fixed_ms << " ms, noise " << noise;
+                    simulation.run(600s, ms, fixed_ms, noise);
+                    EXPECT_LE(simulation.controller.changes(), changes + 2)
+                        << ms << " ms + " << fixed_ms << " ms, noise " << noise;
+                }
 }
 
 // The cost model predicts that the better level is affordable, but it is not.

@@ -16,12 +16,14 @@ inline Log full_log() {
     frame.clock = ARHOST_CLOCK_MEDIA;
     frame.overlay = ARHOST_OVERLAY_NONE;
     frame.scale = 1;
+    frame.shading_px = 1;
     log.frames.push_back(frame);
     frame.number = 6;
     frame.capture_ns = 2'000;
     frame.overlay = ARHOST_OVERLAY_RENDERED;
     frame.scale = 0.5;
     frame.samples = 16;
+    frame.shading_px = 2;
     for (const char *name : {"cup", "lid"}) {
         arhost_target target{};
         target.struct_size = sizeof target;

@@ -42,6 +42,7 @@ TEST(PackedLog, HasAllThatTheLogHas) {
     const RecordedFrame &frame = log.frames[1], expected = full_log().frames[1];
     EXPECT_EQ(frame.number, 6u);
     EXPECT_EQ(frame.samples, 16u);
+    EXPECT_EQ(frame.shading_px, 2u);
     ASSERT_EQ(frame.targets.size(), 2u);
     EXPECT_EQ(std::memcmp(frame.targets.data(), expected.targets.data(), 2 * sizeof(arhost_target)), 0);
     ASSERT_EQ(frame.observations.size(), 1u);
@@ -107,6 +108,8 @@ TEST(PackedLog, ValuesAreChecked) {
         {[](auto &frame) { frame.overlay = 0; }, "overlay: is out of range"},
         {[](auto &frame) { frame.scale = nan; }, "overlay_scale: must be 0.01 to 1"},
         {[](auto &frame) { frame.scale = 1.01; }, "overlay_scale: must be 0.01 to 1"},
+        {[](auto &frame) { frame.shading_px = 0; }, "overlay_shading_px: must be 1 or 2"},
+        {[](auto &frame) { frame.shading_px = 3; }, "overlay_shading_px: must be 1 or 2"},
         {[](auto &frame) { std::ranges::fill(frame.targets[1].name, 'x'); }, "name: must have 1 to 63 bytes"},
         {[](auto &frame) { frame.targets[1].name[0] = 0; }, "name: must have 1 to 63 bytes"},
         {[](auto &frame) { frame.targets[1].name[0] = '\xff'; }, "name: must be UTF-8"},

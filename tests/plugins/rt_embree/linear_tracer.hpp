@@ -118,6 +118,7 @@ public:
         state_.clear();
         return status;
     }
+    std::uint32_t shading_px = 0; // of the next requests
     // The state after the last image.
     std::span<std::byte> state() { return std::as_writable_bytes(std::span(state_)).first(state_size()); }
     LinearPicture render(const arhost_camera &camera, std::uint64_t sequence = 0, const Video *video = nullptr,
@@ -138,7 +139,9 @@ public:
                                             state_.empty() ? nullptr : state_.data(),
                                             after.empty() ? nullptr : after.data(),
                                             state_size(),
-                                            nullptr};
+                                            nullptr,
+                                            shading_px,
+                                            0};
         LinearPicture picture(camera.intrinsics);
         const arhost_image image = picture.image();
         EXPECT_EQ(functions().render(tracer_.plugin().instance(), &request, &image, &picture.info), ARHOST_STATUS_OK)

@@ -179,8 +179,8 @@ public:
         return status;
     }
     arhost_status try_render(const arhost_camera &camera, Picture &picture, const arhost_motion *motion = nullptr) {
-        const arhost_render_request request{sizeof request, 0,       0,       0, camera, motion,
-                                            nullptr,        nullptr, nullptr, 0, nullptr};
+        const arhost_render_request request{sizeof request, 0,       0, 0,       camera, motion, nullptr,
+                                            nullptr,        nullptr, 0, nullptr, 0,      0};
         const arhost_image image = picture.image();
         return functions().render(plugin_.instance(), &request, &image, &picture.info);
     }

@@ -92,7 +92,9 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
                                                 nullptr,
                                                 nullptr,
                                                 0,
-                                                nullptr};
+                                                nullptr,
+                                                0,
+                                                0};
             const arhost_image image{sizeof image,
                                      4 * intrinsics.width,
                                      intrinsics.width,

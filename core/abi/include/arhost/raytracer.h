@@ -100,6 +100,11 @@ typedef struct arhost_render_request {
     /* Reserved for what is known of the room: light, depth and exposure. NULL without
      * ARHOST_RAYTRACER_CAPABILITY_ESTIMATE, and in this version always. */
     const void *estimate;
+    /* Side of the squares of pixels of each of which only one needs to be shaded, in turn from image to image: 2 if
+     * the host lowers the quality in order to keep the frame rate; 0 or 1: all pixels. Edges keep their resolution.
+     * See `coarsest_shading_px` of arhost_render_info */
+    uint32_t shading_px;
+    uint32_t reserved; /* 0 */
 } arhost_render_request;
 
 /* The image to write, top row first. Write every pixel and nothing else; leave the bytes after the last row
@@ -149,7 +154,9 @@ typedef struct arhost_render_info {
                                 one and even if it is empty; without samples accumulated from earlier images. An image
                                 with a limit takes the smaller of this number and max_samples. It may change only with
                                 an option. 0: this ray tracer ignores max_samples */
-    uint32_t reserved;       /* leave 0 */
+    uint32_t coarsest_shading_px; /* largest useful `shading_px` of a request, whatever that of this one and even if
+                                     the image is empty. It may change only with an option. 0: this ray tracer
+                                     ignores shading_px */
 } arhost_render_info;
 
 typedef struct arhost_raytracer {

@@ -91,7 +91,7 @@ typedef struct arhost_record {
      * nor `projected_px` and `false_positive_rate` of other observations. */
     const arhost_expected_marker *expected;
     uint32_t expected_count;
-    uint32_t reserved; /* 0 */
+    uint32_t overlay_shading_px; /* as overlay_samples: `shading_px` of arhost_render_request; 0: all pixels */
 } arhost_record;
 
 /* An augmented frame to read: B, G, R bytes, top row first, `stride` bytes per row. */

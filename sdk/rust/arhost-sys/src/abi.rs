@@ -912,8 +912,10 @@ pub struct arhost_render_request {
     pub state_after: *mut c_void,
     pub state_size: u64,
     pub estimate: *const c_void,
+    pub shading_px: u32,
+    pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_render_request>() == 448);
+const _: () = assert!(size_of::<arhost_render_request>() == 456);
 unsafe impl Sync for arhost_render_request {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -939,7 +941,7 @@ pub struct arhost_render_info {
     pub region_height: u32,
     pub device_time_ns: u64,
     pub full_samples: u32,
-    pub reserved: u32,
+    pub coarsest_shading_px: u32,
 }
 const _: () = assert!(size_of::<arhost_render_info>() == 40);
 #[repr(C)]
@@ -1019,7 +1021,7 @@ pub struct arhost_record {
     pub search: arhost_search,
     pub expected: *const arhost_expected_marker,
     pub expected_count: u32,
-    pub reserved: u32,
+    pub overlay_shading_px: u32,
 }
 const _: () = assert!(size_of::<arhost_record>() == 1256);
 unsafe impl Sync for arhost_record {} // a plugin's statics are immutable
