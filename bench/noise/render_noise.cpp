@@ -5,9 +5,9 @@
 // Renders frames like a run does, with the state of each frame passed to the next, blends them with a grey video, and
 // compares them with converged pictures. Prints, by kind of surface, the RMS difference in codes, and the temporal
 // standard deviation if the camera stands still. Keys: width, height, samples, light_samples, photons, denoise,
-// threads, frames, orbit (degrees per frame), reference (frames of 64 samples), out (folder for the pictures), and
-// for scenes with `motion`: stop (the frame from which on nothing moves), show, hide (the frames from which on the
-// moving objects are visible, and no longer visible).
+// shading_px, threads, frames, orbit (degrees per frame), reference (frames of 64 samples), out (folder for the
+// pictures), and for scenes with `motion`: stop (the frame from which on nothing moves), show, hide (the frames from
+// which on the moving objects are visible, and no longer visible).
 #include "bunny.hpp"
 #include "pixels/linear.hpp"
 #include "raytracer_common/scene_geometry.hpp"
@@ -114,8 +114,10 @@ void write_ppm(const std::string &file, const Codes &codes, std::uint32_t width,
 // Renders frames as a run does.
 class Run {
 public:
-    Run(const arhost_raytracer_setup &setup, const rt_embree::Settings &settings, const arhost::Host &host)
-        : renderer_(setup, settings, host), pixels_(std::size_t{8} * setup.width * setup.height) {
+    Run(const arhost_raytracer_setup &setup, const rt_embree::Settings &settings, const arhost::Host &host,
+        std::uint32_t shading_px = 1)
+        : renderer_(setup, settings, host), shading_px_(shading_px),
+          pixels_(std::size_t{8} * setup.width * setup.height) {
         for (auto &state : states_)
             state.resize(renderer_.state_size() / sizeof(Aligned) + 1);
     }
@@ -132,7 +134,7 @@ public:
             state = {count_ > 0 ? states_[(count_ + 1) % 2].data() : nullptr, states_[count_ % 2].data()};
         const auto begin = std::chrono::steady_clock::now();
         const std::clock_t cpu = std::clock();
-        renderer_.render(camera, image, motion, nullptr, sequence, state);
+        renderer_.render(camera, image, motion, nullptr, sequence, state, shading_px_);
         wall_ms.push_back(
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
         cpu_ms.push_back(1000.0 * static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
@@ -147,6 +149,7 @@ private:
         std::byte bytes[64];
     };
     rt_embree::Renderer renderer_;
+    std::uint32_t shading_px_;
     std::vector<std::uint16_t> pixels_;
     std::array<std::vector<Aligned>, 2> states_;
     std::size_t count_ = 0;
@@ -187,7 +190,7 @@ void run(int argc, char **argv) {
     std::map<std::string, double> value{{"width", 640}, {"height", 480},  {"samples", 1},       {"light_samples", 4},
                                         {"denoise", 1}, {"threads", 0},   {"photons", 1 << 14}, {"frames", 16},
                                         {"orbit", 0},   {"reference", 8}, {"stop", 1e9},        {"show", 0},
-                                        {"hide", 1e9}};
+                                        {"hide", 1e9},  {"shading_px", 1}};
     std::string out;
     for (int i = 2; i < argc; ++i) {
         const std::string argument = argv[i], key = argument.substr(0, argument.find('='));
@@ -212,7 +215,8 @@ void run(int argc, char **argv) {
     settings.photons = static_cast<std::uint32_t>(value["photons"]);
     settings.denoise = value["denoise"] != 0;
     converged.samples = 64;
-    Run noisy(setup, settings, arhost::Host(&host)), reference(setup, converged, arhost::Host(&host));
+    Run noisy(setup, settings, arhost::Host(&host), static_cast<std::uint32_t>(value["shading_px"]));
+    Run reference(setup, converged, arhost::Host(&host));
     const int frames = static_cast<int>(value["frames"]), references = static_cast<int>(value["reference"]);
     MovingObjects objects(arena.scene());
     const auto motion_at = [&](int frame) {

@@ -109,7 +109,8 @@ void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
 
 const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
                                  std::span<const arhost::raytracer_common::PlacedObject> objects, bool deforms,
-                                 std::uint32_t sequence, std::uint32_t samples, std::int32_t flat_catcher) {
+                                 std::uint32_t sequence, std::uint32_t samples, std::int32_t flat_catcher,
+                                 std::uint32_t shading_px) {
     if (static_cast<std::uint32_t>(denoising_.objects.width) != intrinsics.width ||
         static_cast<std::uint32_t>(denoising_.objects.height) != intrinsics.height)
         resize(intrinsics.width, intrinsics.height);
@@ -140,13 +141,12 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     denoising_.before_from_now = nullptr;
     denoising_.camera_moved = false;
     denoising_.pixel_angle = static_cast<float>(1 / intrinsics.fx);
-    denoising_.most_frames = 32;
     denoising_.flat_surface = flat_catcher < 0 ? 0 : surface_number(flat_catcher, real_surface);
     // The numbers of frames may have gaps, such as three of four.
     constexpr std::array<std::int32_t, 4> phases{0, 3, 1, 2};
     denoising_.number = header.first + header.frames;
-    denoising_.catcher_phase = phases[denoising_.number % 4];
-    denoising_.first_random_of_catchers = (header.first + header.frames / 4) * samples;
+    const std::int32_t phase = phases[denoising_.number % 4];
+    denoising_.first_random_in_turn = (header.first + header.frames / 4) * samples;
     const ObjectState *then = nullptr;
     if (before) {
         denoising_.camera_before = earlier.camera;
@@ -167,8 +167,13 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     header.frames_at_rest = then || deforms ? 0
                             : before        ? std::min(earlier.frames_at_rest + 1, frames_to_find_change)
                                             : frames_to_find_change;
-    if (catcher_cell_px_ == 1 && (header.frames_at_rest == 0 || header.frames < frames_to_find_change))
-        denoising_.catcher_phase = -1; // sharp shadows have moved or are new
+    const bool is_coarse = shading_px > 1;
+    const bool sharp_shadows_are_new =
+        catcher_cell_px_ == 1 && (header.frames_at_rest == 0 || header.frames < frames_to_find_change);
+    denoising_.object_phase = is_coarse ? phase : -1;
+    denoising_.catcher_phase = is_coarse || !sharp_shadows_are_new ? phase : -1;
+    denoising_.objects.takes_turns = denoising_.object_phase >= 0;
+    denoising_.catchers.takes_turns = denoising_.catcher_phase >= 0 && denoising_.catchers.cell_px == 1;
     denoising_.finds_change = header.frames_at_rest < frames_to_find_change;
     std::ranges::fill(changes_, Change{});
     std::memcpy(state, &header, sizeof header);

@@ -37,11 +37,13 @@ public:
     std::uint64_t state_size() const { return state_size_; } // bytes
 
     // Prepares a frame. `state.after` must not be NULL. `deforms`: whether meshes have changed; `sequence`: number of
-    // the frame; `samples`: per pixel; `flat_catcher`: index of a flat object, or −1.
+    // the frame; `samples`: per pixel; `flat_catcher`: index of a flat object, or −1; `shading_px`: as in
+    // arhost_render_request.
     // Returns the input of the kernel, which is valid until the next call.
     const Denoising &begin(const StateSlots &state, const arhost_intrinsics &intrinsics, const Camera &camera,
                            std::span<const arhost::raytracer_common::PlacedObject> objects, bool deforms,
-                           std::uint32_t sequence, std::uint32_t samples, std::int32_t flat_catcher);
+                           std::uint32_t sequence, std::uint32_t samples, std::int32_t flat_catcher,
+                           std::uint32_t shading_px);
     // Makes a tile empty.
     void clear(const Tile &tile);
     // Runs the steps after all tiles have been rendered or cleared. Returns a rectangle of the pixels that virtual

@@ -264,7 +264,7 @@ enum GuideRow : int {
 
 // The denoised light of a surface: the radiance of a virtual one divided by its albedo, or the change of a catcher.
 enum LightRow : int {
-    variance_light = 3, // of the luminance of the three rows before; at first, `sampled` or `not_sampled`
+    variance_light = 3, // of the luminance of the three rows before; at first, whether it was sampled (`sampled`)
     light_rows
 };
 
@@ -291,6 +291,8 @@ struct Layer {
     bool of_catchers;                   // else of virtual objects
     std::int32_t cell_px;               // side of a cell
     std::int32_t width, height, stride; // cells
+    // Each cell gets light in one of four frames, except of surfaces that are sampled in every frame.
+    bool takes_turns;
     float *guides[guide_rows];
     float *light[2][light_rows];       // each step of the filter reads one and writes the other
     const float *before[history_rows]; // of the previous frame; NULL: there is none
@@ -305,6 +307,7 @@ struct Layer {
 
 struct Denoising {
     static constexpr std::size_t most_objects = most_surfaces / 4 - 2;
+    static constexpr float most_frames = 32; // that count in the means
     // The light of virtual objects in each pixel, and that of catchers; if no lamp casts sharp shadows, in cells of
     // 2×2 pixels. The guides of `objects` are also those of catchers, except of the flat one.
     Layer objects, catchers;
@@ -312,13 +315,13 @@ struct Denoising {
     Camera camera_before;
     bool camera_moved;
     float pixel_angle;         // width of a pixel in the middle of the image, in units of its distance
-    float most_frames;         // that count in the means
     bool finds_change;         // whether to look for light that has changed
     std::int32_t flat_surface; // number of that of PathScene::wide_catcher; 0: there is none
-    // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels.
-    std::int32_t catcher_phase;
-    std::uint32_t number;                   // of the frame, without gaps
-    std::uint32_t first_random_of_catchers; // as Frame::first_random
+    // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels. Likewise the
+    // virtual objects; but mirrors and glass, whose history is short, always at all pixels.
+    std::int32_t catcher_phase, object_phase;
+    std::uint32_t number;               // of the frame, without gaps
+    std::uint32_t first_random_in_turn; // as Frame::first_random, of pixels that are sampled in every fourth frame
     // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
     // axes. NULL if no placement has changed.
     const float *before_from_now;
@@ -376,8 +379,8 @@ struct RayQueue {
     std::int32_t count, capacity;
 };
 
-// Rays through the centres of pixels to catchers that wait to be sampled.
-struct DeferredCatchers {
+// Rays through the centres of pixels that wait to be sampled.
+struct DeferredPixels {
     static constexpr int rows = 4; // direction, and the pixel's number in the tile (an int's bits)
     float *values[rows];
     std::int32_t count;
@@ -397,10 +400,10 @@ struct Scratch {
     float *radiance[3];
     float *sum[sum_rows]; // sums over all samples
     float *guide[guide_rows];
-    DeferredCatchers deferred;
-    Windows virtual_windows; // of virtual objects; unknown if there are occluders
-    Windows windows;         // of all objects but PathScene::wide_catcher and occluders
-    RayQueue *queues;        // one queue per depth, from 0 to Scene::max_depth
+    DeferredPixels catchers, objects; // to be sampled
+    Windows virtual_windows;          // of virtual objects; unknown if there are occluders
+    Windows windows;                  // of all objects but PathScene::wide_catcher and occluders
+    RayQueue *queues;                 // one queue per depth, from 0 to Scene::max_depth
 };
 
 // Renders a tile. Returns the bounding rectangle of the pixels with non-zero alpha, enlarged to whole blocks of 4×4

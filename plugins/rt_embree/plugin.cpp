@@ -56,11 +56,15 @@ public:
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
-        const bool is_complete = request.struct_size >= sizeof request; // an older host's struct lacks fields
-        const bool has_state = is_complete && request.state_size >= renderer_->state_size();
-        const Rectangle drawn = renderer_->render(
-            request.camera, image, request.motion, is_complete ? request.video : nullptr, request.sequence,
-            has_state ? StateSlots{request.state_before, request.state_after} : StateSlots{});
+        // An older host's struct lacks fields.
+        const auto has = [&](std::size_t field) { return request.struct_size > field; };
+        const bool has_state =
+            has(offsetof(arhost_render_request, state_size)) && request.state_size >= renderer_->state_size();
+        const Rectangle drawn =
+            renderer_->render(request.camera, image, request.motion,
+                              has(offsetof(arhost_render_request, video)) ? request.video : nullptr, request.sequence,
+                              has_state ? StateSlots{request.state_before, request.state_after} : StateSlots{},
+                              has(offsetof(arhost_render_request, shading_px)) ? request.shading_px : 1);
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
             info.region_x = static_cast<std::uint32_t>(drawn.x0);
@@ -68,8 +72,10 @@ public:
             info.region_width = static_cast<std::uint32_t>(drawn.x1 - drawn.x0);
             info.region_height = static_cast<std::uint32_t>(drawn.y1 - drawn.y0);
         }
-        if (info.struct_size >= sizeof info) // an older host's struct lacks the field
+        if (info.struct_size >= sizeof info) { // an older host's struct lacks these fields
             info.full_samples = settings_.samples;
+            info.coarsest_shading_px = renderer_->state_size() > 0 ? 2 : 0;
+        }
     }
 
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};

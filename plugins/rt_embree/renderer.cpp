@@ -106,8 +106,9 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     // are read even from partly filled queues, so each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
     constexpr int pixel_rows = plane_count * 3 + sum_rows + guide_rows;
+    constexpr std::int32_t caught_capacity = tile_pixels / 4 + packet, deferred_capacity = tile_pixels + packet;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
-                    std::size_t{DeferredCatchers::rows} * (tile_pixels / 4 + packet) +
+                    std::size_t{DeferredPixels::rows} * (caught_capacity + deferred_capacity) +
                     std::size_t{RayQueue::rows} * (first_capacity + std::size_t{max_depth} * capacity));
     float *next = storage_.data();
     const auto take = [&](std::int32_t count) { return std::exchange(next, next + count); };
@@ -117,8 +118,10 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
         row = take(tile_pixels);
     for (float *&row : scratch_.guide)
         row = take(tile_pixels);
-    for (float *&row : scratch_.deferred.values)
-        row = take(tile_pixels / 4 + packet);
+    for (float *&row : scratch_.catchers.values)
+        row = take(caught_capacity);
+    for (float *&row : scratch_.objects.values)
+        row = take(deferred_capacity);
     for (std::uint32_t depth = 0; depth <= max_depth; ++depth) {
         const std::int32_t size = depth == 0 ? first_capacity : capacity;
         queues_[depth] = {take(RayQueue::rows * size), 0, size};
@@ -318,7 +321,8 @@ PathScene Renderer::path_scene() const {
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion,
-                           const arhost_frame *video, std::uint64_t sequence, const StateSlots &state) {
+                           const arhost_frame *video, std::uint64_t sequence, const StateSlots &state,
+                           std::uint32_t shading_px) {
     set_size(camera);
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
     const Pose pose(camera);
@@ -379,7 +383,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         frame.view = view_;
         frame.denoising = &denoiser_->begin(
             state, intrinsics_, frame.camera, scene_.placed_objects(), motion && motion->deformed_count > 0,
-            static_cast<std::uint32_t>(sequence), full_samples_, windows.wide_catcher());
+            static_cast<std::uint32_t>(sequence), full_samples_, windows.wide_catcher(), shading_px);
     }
     std::optional<Surroundings> surroundings;
     if (frame.denoising && remembers_) {

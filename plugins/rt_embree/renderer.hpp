@@ -54,9 +54,10 @@ public:
     // Returns a rectangle that contains all pixels that virtual objects affect; if there are none, it has x1 <= x0.
     // `motion` is NULL if nothing has moved since the last call, `video` if the frame under the overlay is unknown.
     // `sequence`: number of the frame, for the random numbers of the path integrator. `state`: of state_size() bytes;
-    // without it, there is no denoising.
+    // without it, there is no denoising. `shading_px`: as in arhost_render_request, for denoising only.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr,
-                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0, const StateSlots &state = {});
+                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0, const StateSlots &state = {},
+                     std::uint32_t shading_px = 1);
     std::uint64_t state_size() const {
         return (denoiser_ ? denoiser_->state_size() : 0) + (remembers_ ? surroundings_state_size() : 0);
     }

@@ -158,6 +158,32 @@ TEST(Sessions, AReplayRepeatsTheReducedQualityOfALiveRun) {
     expect_same(run);
 }
 
+// Each image also depends on those before, but is never too late to be shown.
+TEST(Sessions, AReplayRepeatsTheReducedShadingOfALiveRun) {
+    std::string yaml = recording("live", "0");
+    yaml.replace(yaml.find(scenes), scenes.size() + std::string("optix-cs.yaml").size(), "path.yaml");
+    ArhostRun run(yaml);
+    run.write("path.yaml",
+              "version: 2\naxes: z-up\nbackground: 0.3\n"
+              "materials: {paper: {model: diffuse, diffuse: 0.7}, red: {model: diffuse, diffuse: [0.7, 0.1, 0.1]}}\n"
+              "objects:\n- {name: table, plane: {size: 500}, material: paper, role: catcher}\n"
+              "- {name: ball, sphere: {centre: [0, 0, 25], radius: 25}, material: red}\n");
+    // No ray tracer reaches this frame rate.
+    run.start({"--config", "run.yaml", "--set", "live.target_fps=10000", "--set", "live.min_scale=1", "--set",
+               "source.options.occlude_from=-1"});
+    const auto is_reduced = [](const Json &line) {
+        return line.value("overlay_shading_px", 1) == 2 && line["overlay"] != "none";
+    };
+    EXPECT_TRUE(run.eventually([&] {
+        return run.exists("take/frames.jsonl") &&
+               std::ranges::count_if(lines_of(run, "take/frames.jsonl"), is_reduced) >= 5;
+    })) << run.output();
+    send_signal(run.pid(), SIGTERM);
+    ASSERT_EQ(run.wait(), 130) << run.output();
+    ASSERT_EQ(run.run(replaying({"--allow", "path.yaml"})), 0) << run.output();
+    expect_same(run);
+}
+
 TEST(Sessions, AReplayWithAnotherTrackerAndQualityRendersEveryFrameAnew) {
     ArhostRun run(recording("lockstep", "30"));
     ASSERT_EQ(run.run(), 0) << run.output();

@@ -51,8 +51,10 @@ ARHOST_INLINE Vec3 unpacked_normal(Int a) {
     return {value(a), value(a >> Int(10)), value(a >> Int(20))};
 }
 
-// Values of variance_light of light[0]: whether the light of a cell was sampled in this frame.
-constexpr float not_sampled = 0, sampled = 1;
+// Values of variance_light of light[0]: whether the light of a cell was sampled in this frame; if only because no
+// other cell nearby shows its surface, it counts at new surfaces only, since its random numbers are those of its
+// turn.
+constexpr float not_sampled = 0, sampled = 1, sampled_early = 2;
 
 // The cells of a layer that a block of pixels covers.
 struct BlockCells {
@@ -186,7 +188,10 @@ ARHOST_INLINE void write_for_denoiser(const Frame &frame, const Scratch &scratch
         store(values, select(is_virtual, light, Float(0.0f)));
         write_cells(layer, cells, layer.light[0][i], values);
     }
-    store(values, Float(sampled));
+    const int phase = denoising.object_phase;
+    const Bool in_turn = is_kind(surface, specular_surface) | (phase_of_lanes() == Int(phase)) | bool_of(phase < 0);
+    const Bool is_sampled = objects_in_turn(frame, scratch, first_pixel);
+    store(values, select(in_turn, Float(sampled), select(is_sampled, Float(sampled_early), Float(not_sampled))));
     write_cells(layer, cells, layer.light[0][variance_light], values);
 }
 
@@ -279,10 +284,9 @@ ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int ro
 // Returns the light of a row's cells without fireflies: single paths that find a small bright light would remain
 // visible for many frames. So light may be only somewhat brighter than that of the cells around, if there are enough
 // of the same surface.
-ARHOST_INLINE Vec3 light_without_fireflies(const Denoising &denoising, const Layer &layer, std::ptrdiff_t at, int row,
-                                           Int surface) {
+ARHOST_INLINE Vec3 light_without_fireflies(const Layer &layer, std::ptrdiff_t at, int row, Int surface) {
     // The nearest cells that were sampled, too.
-    const int apart = layer.of_catchers && layer.cell_px == 1 && denoising.catcher_phase >= 0 ? 2 : 1;
+    const int apart = layer.takes_turns ? 2 : 1;
     Float brightest(0.0f), count(0.0f);
     for (int dy = -apart; dy <= apart; dy += apart)
         for (int dx = -apart; dx <= apart; dx += apart) {
@@ -317,7 +321,7 @@ ARHOST_INLINE void find_change(const Frame &frame, const Layer &layer, std::int3
         store(layer.after[frames_history] + kept, past.frames);
         const Bool counts =
             active & (past.frames > Float(0.0f)) & (load(layer.light[0][variance_light] + at) == Float(sampled));
-        const Float light = luminance(light_without_fireflies(*frame.denoising, layer, at, row, surface));
+        const Float light = luminance(light_without_fireflies(layer, at, row, surface));
         const Float change = select(counts, min(light, Float(65504.0f)) - past.moments[0], Float(0.0f));
         alignas(64) float changes[lanes];
         store(changes, change);
@@ -345,7 +349,7 @@ ARHOST_INLINE float evidence_of(const Change &change) {
 // Returns how many frames may count in the means of a row's cells.
 ARHOST_INLINE Float most_frames_of(const Denoising &denoising, const Layer &layer, int x, int row) {
     if (!denoising.finds_change)
-        return Float(denoising.most_frames);
+        return Float(Denoising::most_frames);
     alignas(64) float frames[lanes];
     const int columns = layer.changes_per_row(), line = row / Layer::change_side;
     const int lines = (layer.height + Layer::change_side - 1) / Layer::change_side;
@@ -365,7 +369,7 @@ ARHOST_INLINE Float most_frames_of(const Denoising &denoising, const Layer &laye
         const float evidence = here > near ? here : near;
         constexpr float negligible = 4; // 5 % of unchanged squares have more
         const float doubt = negligible / (evidence > negligible ? evidence : negligible);
-        const float most = denoising.most_frames * doubt * doubt;
+        const float most = Denoising::most_frames * doubt * doubt;
         for (int i = 0; i < Layer::change_side; ++i)
             frames[first + i] = most > 1 ? most : 1;
     }
@@ -389,7 +393,7 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         }
         const float *const *guides = layer.guides;
         const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
-        const Vec3 light = light_without_fireflies(denoising, layer, at, row, surface);
+        const Vec3 light = light_without_fireflies(layer, at, row, surface);
         Past past;
         if (denoising.finds_change)
             past = {load3(layer.after, kept),
@@ -397,12 +401,17 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
                     load(layer.after[frames_history] + kept)};
         else
             past = past_of(frame, layer, x, row, position, normal, surface, active);
-        const Bool is_new = load(layer.light[0][variance_light] + at) == Float(sampled);
+        const Float state = load(layer.light[0][variance_light] + at);
+        const Bool is_new =
+            (state == Float(sampled)) | ((state == Float(sampled_early)) & (past.frames == Float(0.0f)));
+        // Of surfaces that are sampled in one of four frames, about the same time counts.
+        const Bool in_turn = bool_of(layer.takes_turns) & ~is_kind(surface, specular_surface);
+        const Float most_of_glossy = select(in_turn, Float(8.0f / 3), Float(8.0f));
         Float most = most_frames_of(denoising, layer, x, row);
         // The surroundings have no noise in mirrors and glass.
         const Bool shows_surroundings = is_kind(surface, specular_surface) & (surface < Int(mirrored_unit));
         if (denoising.camera_moved || denoising.before_from_now) // highlights move over the surface
-            most = select(is_kind(surface, glossy_surface), min(most, Float(8.0f)), most);
+            most = select(is_kind(surface, glossy_surface), min(most, most_of_glossy), most);
         if (denoising.camera_moved) {
             // Curved mirrors and glass show a surface elsewhere than store_seen() assumes.
             most = select(is_kind(surface, specular_surface), min(most, Float(4.0f)), most);
@@ -476,10 +485,10 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
         const Vec3 light = load3(from, at);
         const Float own = luminance(light);
         Float variance = load(from[variance_light] + at);
-        if (pass == 0)
-            if (const Bool needed = variance == Float(unknown); any(needed))
-                variance = select(needed, variance_of_neighbours(layer, from, at, row, surface), variance);
         const Bool has_light = variance > Float(no_light);
+        if (pass == 0)
+            if (const Bool needed = variance < Float(0.0f); any(needed))
+                variance = select(needed, variance_of_neighbours(layer, from, at, row, surface), variance);
         // Surfaces are flat within the width of a tap, up to about twice the size of a pixel.
         // In curved mirrors they are not.
         const Float distance = length(position - splat(frame.camera.eye)) *
@@ -523,7 +532,9 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
                     weight = weight * alike * falling(apart * inverse_tolerance);
                 }
                 const Float plausible = falling(difference * difference / (spread * tolerated));
-                weight = select(same, weight * select(has_light, plausible, Float(1.0f)), Float(0.0f));
+                // Next to a cell without light, one with light is at least better than none.
+                weight = select(has_light, weight * plausible, max(weight, Float(1e-6f)));
+                weight = select(same, weight, Float(0.0f));
                 sum = sum + other * weight;
                 squares = squares + weight * weight * max(of_other, least);
                 total = total + weight;
@@ -788,7 +799,7 @@ ARHOST_INLINE Vec3 viewed(const Frame &frame, const InterpolatedCatchers &catche
         const std::ptrdiff_t kept = history_at(objects, x, row),
                              kept_cell = history_at(cells, x / cells.cell_px, row / cells.cell_px);
         return grey(value(objects.after[frames_history] + kept, cells.after[frames_history] + kept_cell) *
-                    Float(1 / frame.denoising->most_frames));
+                    Float(1 / Denoising::most_frames));
     }
     case View::variance: {
         const auto variance = [](const Layer &layer) {

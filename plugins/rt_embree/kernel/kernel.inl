@@ -200,10 +200,7 @@ struct Path {
                                       Bool active, Bool near) {
         return primary_path(work, first_pixel, direction, direction_at, active, near);
     }
-    static ARHOST_INLINE void finish_primary(Work &work) {
-        if (work.scratch.deferred.count > 0)
-            sample_deferred_catchers(work);
-    }
+    static ARHOST_INLINE void finish_primary(Work &work) { sample_deferred(work); }
     static ARHOST_INLINE void trace_packet(Work &work, std::uint32_t depth) { trace_path_packet(work, depth); }
     static ARHOST_INLINE void accumulate(const Frame &frame, Scratch &scratch, int first_pixel) {
         accumulate_path(frame, scratch, first_pixel);

@@ -170,39 +170,78 @@ ARHOST_INLINE Int phase_of_lanes() {
     return (lane_numbers() & Int(1)) | ((lane_numbers() >> Int(1)) & Int(2));
 }
 
-// Keeps the rays to the catchers that are sampled in this frame: one of each 2×2 pixels.
-ARHOST_INLINE void defer_catchers(Work &work, Vec3 direction, Int pixel, Bool caught) {
-    const Bool chosen = caught & (phase_of_lanes() == Int(work.frame.denoising->catcher_phase));
-    alignas(64) float by_lane[DeferredCatchers::rows][lanes];
+// Returns the pixels of a block in which virtual objects are sampled in this frame: one of each 2×2 pixels, and one
+// of each surface that this pixel does not show.
+ARHOST_INLINE Bool objects_in_turn(const Frame &frame, const Scratch &scratch, int first_pixel) {
+    const int phase = frame.denoising->object_phase;
+    if (phase < 0)
+        return bool_of(true);
+    const float *surfaces = scratch.guide[surface_guide] + first_pixel;
+    const Int surface = bits_of(load(surfaces));
+    const auto normal_of = [&](Int lane) __attribute__((always_inline)) {
+        const float *const *rows = scratch.guide + normal_guide;
+        return Vec3{pick(rows[0] + first_pixel, lane), pick(rows[1] + first_pixel, lane),
+                    pick(rows[2] + first_pixel, lane)};
+    };
+    const Vec3 normal = normal_of(lane_numbers());
+    const Int turn = (phase_of_lanes() - Int(phase)) & Int(3); // the first pixel with a surface is sampled
+    Bool chosen = bool_of(true);
+    for (int i = 1; i < 4; ++i) {
+        const Int earlier = (phase_of_lanes() - Int(i)) & Int(3);
+        const Int there = (lane_numbers() & Int(~(1 | block))) | (earlier & Int(1)) | ((earlier & Int(2)) << Int(1));
+        const Bool same = (bits_of(pick(surfaces, there)) == surface) & (dot(normal_of(there), normal) > Float(0.8f));
+        chosen = chosen & ~(same & (Int(i - 1) < turn));
+    }
+    return chosen;
+}
+
+// Keeps rays for sample_deferred().
+ARHOST_INLINE void defer(DeferredPixels &deferred, Vec3 direction, Int pixel, Bool chosen) {
+    alignas(64) float by_lane[DeferredPixels::rows][lanes];
     const Float values[] = {direction.x, direction.y, direction.z, float_of(pixel)};
-    for (int row = 0; row < DeferredCatchers::rows; ++row)
+    for (int row = 0; row < DeferredPixels::rows; ++row)
         store(by_lane[row], values[row]);
-    DeferredCatchers &deferred = work.scratch.deferred;
     for (unsigned remaining = mask_of(chosen.lane); remaining; remaining &= remaining - 1, ++deferred.count)
-        for (int row = 0; row < DeferredCatchers::rows; ++row)
+        for (int row = 0; row < DeferredPixels::rows; ++row)
             deferred.values[row][deferred.count] = by_lane[row][__builtin_ctz(remaining)];
 }
 
-// Samples the deferred catchers in full packets. Their random numbers have a sequence of their own at this vertex, as
-// each pixel is sampled in every fourth frame only.
-ARHOST_INLINE void sample_deferred_catchers(Work &work) {
-    DeferredCatchers &deferred = work.scratch.deferred;
-    const std::uint32_t sample = work.sample;
-    work.sample = work.frame.denoising->first_random_of_catchers + work.index;
+// Calls shade(paths, rays, lanes) for the hits of full packets of deferred rays.
+template <class Shade>
+ARHOST_INLINE void trace_deferred(const Work &work, DeferredPixels &deferred, RTCScene bvh, Query query,
+                                  unsigned mask, Shade shade) {
     for (std::int32_t first = 0; first < deferred.count; first += lanes) {
         const Bool active = lane_numbers() < Int(deferred.count - first);
         const auto row = [&](int i) __attribute__((always_inline)) {
             return load(deferred.values[i] + first);
         };
         RTCRayHit16 rays;
-        set_ray(rays.ray, splat(work.frame.camera.eye), {row(0), row(1), row(2)}, Float(far_away), Int(catcher_mask));
-        const Bool caught =
-            trace(work.frame.scene, work.frame.scene.catchers, make_query(Coherence::coherent, true), rays, active);
-        const Paths paths{select(active, bits_of(row(3)), Int(0)), -1, white(), 0, Float(0.0f)};
-        if (any(caught))
-            change_catcher(work, in_plane(paths, change_plane), rays, caught);
+        set_ray(rays.ray, splat(work.frame.camera.eye), {row(0), row(1), row(2)}, Float(far_away),
+                Int(static_cast<int>(mask)));
+        const Bool hit = trace(work.frame.scene, bvh, query, rays, active);
+        if (any(hit))
+            shade(Paths{select(active, bits_of(row(3)), Int(0)), -1, white(), 0, Float(0.0f)}, rays, hit);
     }
     deferred.count = 0;
+}
+
+// Samples the deferred pixels. Their random numbers have a sequence of their own at this vertex, as each pixel is
+// sampled in every fourth frame only.
+ARHOST_INLINE void sample_deferred(Work &work) {
+    Scratch &scratch = work.scratch;
+    if (scratch.catchers.count == 0 && scratch.objects.count == 0)
+        return;
+    const Scene &scene = work.frame.scene;
+    const std::uint32_t sample = work.sample;
+    work.sample = work.frame.denoising->first_random_in_turn + work.index;
+    trace_deferred(
+        work, scratch.catchers, scene.catchers, make_query(Coherence::coherent, true), catcher_mask,
+        [&](const Paths &paths, const RTCRayHit16 &rays, const Bool &caught)
+            __attribute__((always_inline)) { change_catcher(work, in_plane(paths, change_plane), rays, caught); });
+    trace_deferred(
+        work, scratch.objects, scene.root, make_query(Coherence::coherent), virtual_masks,
+        [&](const Paths &paths, const RTCRayHit16 &rays, const Bool &hit)
+            __attribute__((always_inline)) { shade_path(work, rays, hit, paths); });
     work.sample = sample;
 }
 
@@ -260,7 +299,8 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Dir
         store_guides(work, hits, direction, first_pixel);
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
     if (work.frame.denoising && work.frame.denoising->catcher_phase >= 0)
-        defer_catchers(work, direction, paths.pixel, hits.caught);
+        defer(work.scratch.catchers, direction, paths.pixel,
+              hits.caught & (phase_of_lanes() == Int(work.frame.denoising->catcher_phase)));
     else if (any(hits.caught))
         change_catcher(work, in_plane(paths, change_plane), hits.catcher_rays, hits.caught);
     if (!any(hits.is_virtual))
@@ -273,6 +313,11 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Dir
         rest = rest & ~specular;
         if (any(specular))
             shade_specular(work, hits, paths, direction_at, specular);
+        if (work.frame.denoising->object_phase >= 0) {
+            defer(work.scratch.objects, direction, paths.pixel,
+                  rest & objects_in_turn(work.frame, work.scratch, first_pixel));
+            return true;
+        }
     }
     if (any(rest))
         shade_path(work, hits.rays, rest, paths);

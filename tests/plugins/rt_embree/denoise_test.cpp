@@ -167,8 +167,10 @@ TEST_F(Denoising, ImagesDependOnTheRequestOnly) {
         tracers.push_back(std::make_unique<LinearTracer>(with_mirror_and_glass(), options, "rt_embree"));
         ASSERT_EQ(tracers.back()->start(pinhole()), ARHOST_STATUS_OK);
     }
-    for (std::uint64_t frame = 0; frame < 3; ++frame) {
+    for (std::uint64_t frame = 0; frame < 6; ++frame) {
         const arhost_camera view = turned(0.5 * static_cast<double>(frame));
+        for (const auto &tracer : tracers)
+            tracer->shading_px = frame < 3 ? 1 : 2;
         const LinearPicture expected = tracers[0]->render(view, frame);
         for (std::size_t i = 1; i < tracers.size(); ++i) {
             EXPECT_EQ(tracers[i]->render(view, frame).pixels(), expected.pixels()) << frame << ", variant " << i;
@@ -183,12 +185,17 @@ TEST(DenoisingOfMirrors, ANewWorkerRendersTheSameImage) {
         fresh(with_mirror_and_glass(), denoised, "rt_embree");
     ASSERT_EQ(old.start(pinhole()), ARHOST_STATUS_OK) << old.log();
     ASSERT_EQ(fresh.start(pinhole()), ARHOST_STATUS_OK) << fresh.log();
-    for (std::uint64_t i = 0; i < 20; ++i)
+    for (std::uint64_t i = 0; i < 20; ++i) {
+        old.shading_px = i % 2 == 0 ? 1 : 2; // a setting of each image, not of later ones
         old.render(turned(0), i);
+    }
     fresh.render(turned(0), 0);
-    std::ranges::copy(old.state(), fresh.state().begin());
-    EXPECT_EQ(fresh.render(turned(0), 20).pixels(), old.render(turned(0), 20).pixels());
-    EXPECT_TRUE(std::ranges::equal(fresh.state(), old.state()));
+    for (const std::uint32_t shading_px : {0u, 2u}) {
+        std::ranges::copy(old.state(), fresh.state().begin());
+        fresh.shading_px = old.shading_px = shading_px;
+        EXPECT_EQ(fresh.render(turned(0), 20).pixels(), old.render(turned(0), 20).pixels()) << shading_px;
+        EXPECT_TRUE(std::ranges::equal(fresh.state(), old.state())) << shading_px;
+    }
 }
 
 TEST_F(Denoising, IgnoresAStateOfAnotherVersionOrSize) {
@@ -216,7 +223,9 @@ TEST(Quality, DeterminesSamplesAndDenoising) {
         arhost_camera view = turned(0);
         view.intrinsics = pinhole(16, 8, 16);
         ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK) << tracer.log();
-        EXPECT_EQ(tracer.render(view, 0).info.full_samples, samples);
+        const arhost_render_info info = tracer.render(view, 0).info;
+        EXPECT_EQ(info.full_samples, samples);
+        EXPECT_EQ(info.coarsest_shading_px, denoises ? 2u : 0u);
         EXPECT_EQ(!tracer.state().empty(), denoises) << samples;
     }
 }
@@ -280,6 +289,58 @@ TEST(Show, NeedsDenoising) {
     whitted.add_ball("ball", {0, 0, 25, 25}, diffuse(0.7f, 0.2f, 0.1f));
     Tracer tracer(std::move(whitted), {{"quality", "realtime"}, {"show", "normals"}});
     EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_ERROR_UNSUPPORTED);
+}
+
+// One of each 2×2 pixels is shaded.
+TEST_F(Denoising, ConvergesWithAQuarterOfTheShading) {
+    tracer_.shading_px = 2;
+    const LinearPicture truth = picture_of(still_life(), converged, turned(0));
+    const double noise = difference(picture_of(still_life(), noisy, turned(0)), truth);
+    EXPECT_LT(difference(next(0), truth), 0.5 * noise);
+    for (int i = 0; i < 14; ++i)
+        next(0);
+    EXPECT_LT(difference(next(0), truth), 0.2 * noise);
+}
+
+TEST_F(Denoising, FollowsTheCameraWithAQuarterOfTheShading) {
+    tracer_.shading_px = 2;
+    for (int i = 0; i < 11; ++i)
+        next(0.7 * i);
+    const LinearPicture truth = picture_of(still_life(), converged, turned(0.7 * 11));
+    const double noise = difference(picture_of(still_life(), noisy, turned(0.7 * 11)), truth);
+    EXPECT_LT(difference(next(0.7 * 11), truth), 0.25 * noise);
+}
+
+// Also those of objects that are thinner than two pixels: in the first image, each pixel has the light of its
+// surface.
+TEST(DenoisingOfAQuarterOfTheShading, LeavesEdgesAsTheyAre) {
+    const auto scene = [] {
+        SceneBuilder scene(path_traced(1));
+        scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
+        for (int i = 0; i < 6; ++i) {
+            const float x = -60 + 20.0f * static_cast<float>(i), half = 0.3f;
+            scene.add_mesh("blade " + std::to_string(i),
+                           quad({x - half, 0, 0}, {x + half, 0, 0}, {x + half + 9, 0, 60}, {x - half + 9, 0, 60}),
+                           i % 2 == 0 ? diffuse(0.8f, 0.2f, 0.2f) : diffuse(0.2f, 0.2f, 0.8f));
+        }
+        scene.add_mesh("box", moved(cube(10), {70, 30, 10}), diffuse(0.7f, 0.7f, 0.7f));
+        return scene;
+    };
+    LinearTracer fine(scene(), denoised, "rt_embree"), coarse(scene(), denoised, "rt_embree");
+    ASSERT_EQ(fine.start(pinhole()), ARHOST_STATUS_OK) << fine.log();
+    ASSERT_EQ(coarse.start(pinhole()), ARHOST_STATUS_OK) << coarse.log();
+    coarse.shading_px = 2;
+    const LinearPicture expected = fine.render(turned(0)), picture = coarse.render(turned(0));
+    std::uint32_t objects = 0;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x) {
+            const bool shows_object = expected.value(x, y, 4) < 0.9f && expected.value(x, y, 0) > 0.1f;
+            if (!shows_object)
+                continue;
+            ++objects;
+            EXPECT_NEAR(picture.value(x, y, 0), expected.value(x, y, 0), 0.3) << x << ", " << y;
+        }
+    EXPECT_GT(objects, 500u);
 }
 
 // Light from the side, or that a mirror throws, changes the table far away from the objects.
