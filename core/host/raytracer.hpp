@@ -42,7 +42,7 @@ public:
     const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
 
 private:
-    // What a plugin reports in arhost_render_info.
+    // Fields of arhost_render_info.
     struct Adaptable {
         std::uint32_t full_samples = 0, coarsest_shading_px = 0;
         bool operator==(const Adaptable &) const = default;
