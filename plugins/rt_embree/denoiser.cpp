@@ -18,6 +18,7 @@ namespace {
 struct StateHeader {
     std::uint32_t version, width, height;
     std::uint32_t first, frames;  // number of the history's first frame, and of the frames since
+    std::uint32_t sequence;       // of the frame, with gaps
     std::uint32_t frames_at_rest; // number of frames since an object has moved
     Camera camera;
 };
@@ -27,6 +28,9 @@ struct ObjectState {
 };
 constexpr std::uint32_t state_version = 3;
 constexpr std::size_t alignment = 64; // of the rows, bytes
+// If objects move while so many frames are missing, such as those in which a marker is lost, the history is of no
+// use. A slow ray tracer misses fewer.
+constexpr std::uint32_t long_gap = 16;
 
 std::size_t aligned(std::size_t size) {
     return (size + alignment - 1) / alignment * alignment;
@@ -117,7 +121,8 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     const std::array<Layer *, 2> layers{&denoising_.objects, &denoising_.catchers};
     auto *state = static_cast<std::byte *>(slots.after);
     std::memset(state, 0, rows_offset(objects_));
-    StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, 0, camera}, earlier{};
+    StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, sequence, 0, camera},
+        earlier{};
     const auto *before = static_cast<const std::byte *>(slots.before);
     if (before)
         std::memcpy(&earlier, before, sizeof earlier);
@@ -156,7 +161,10 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         if (std::memcmp(then, now, sizeof(ObjectState) * objects_) == 0)
             then = nullptr;
     }
-    if (then) {
+    if (then && sequence - earlier.sequence > long_gap) {
+        for (Layer *layer : layers)
+            std::ranges::fill(layer->before, nullptr);
+    } else if (then) {
         for (std::size_t i = 0; i < objects_; ++i)
             write_motion(now[i].world_from_object, then[i].world_from_object, motion_.data() + 12 * i);
         denoising_.before_from_now = motion_.data();

@@ -486,8 +486,9 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
         const Float own = luminance(light);
         Float variance = load(from[variance_light] + at);
         const Bool has_light = variance > Float(no_light);
+        const Bool fills = ~has_light & bool_of(!layer.of_catchers); // resolve() fills catchers
         if (pass == 0)
-            if (const Bool needed = variance < Float(0.0f); any(needed))
+            if (const Bool needed = (variance == Float(unknown)) | fills; any(needed))
                 variance = select(needed, variance_of_neighbours(layer, from, at, row, surface), variance);
         // Surfaces are flat within the width of a tap, up to about twice the size of a pixel.
         // In curved mirrors they are not.
@@ -532,8 +533,8 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
                     weight = weight * alike * falling(apart * inverse_tolerance);
                 }
                 const Float plausible = falling(difference * difference / (spread * tolerated));
-                // Next to a cell without light, one with light is at least better than none.
-                weight = select(has_light, weight * plausible, max(weight, Float(1e-6f)));
+                weight = weight * select(has_light, plausible, Float(1.0f));
+                weight = max(weight, select(fills, Float(1e-6f), Float(0.0f))); // any light is better than none
                 weight = select(same, weight, Float(0.0f));
                 sum = sum + other * weight;
                 squares = squares + weight * weight * max(of_other, least);
