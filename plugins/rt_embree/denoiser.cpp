@@ -51,13 +51,18 @@ Layer make_layer(std::uint32_t width, std::uint32_t height, std::int32_t cell_px
 std::size_t history_plane(const Layer &layer) {
     return static_cast<std::size_t>(layer.stride) * static_cast<std::size_t>(layer.height);
 }
+std::size_t changes_of(const Layer &layer) {
+    const std::int32_t lines = (layer.height + Layer::change_side - 1) / Layer::change_side;
+    return static_cast<std::size_t>(lines * layer.changes_per_row());
+}
 std::size_t guide_plane(const Layer &layer) {
     return static_cast<std::size_t>(layer.guide_stride()) * static_cast<std::size_t>(layer.height);
 }
-std::size_t size_of(std::uint32_t width, std::uint32_t height, std::size_t objects, std::int32_t catcher_cell_px) {
-    return rows_offset(objects) + history_rows * sizeof(float) *
-                                      (history_plane(make_layer(width, height, 1)) +
-                                       history_plane(make_layer(width, height, catcher_cell_px)));
+std::size_t size_of(std::uint32_t width, std::uint32_t height, std::size_t objects, std::int32_t catcher_cell_px,
+                    bool has_gloss) {
+    const std::size_t fine = history_plane(make_layer(width, height, 1)),
+                      of_catchers = history_plane(make_layer(width, height, catcher_cell_px));
+    return rows_offset(objects) + history_rows * sizeof(float) * (fine + of_catchers + (has_gloss ? fine : 0));
 }
 
 // Writes to · inverse(from): the motion from one placement to another.
@@ -82,33 +87,45 @@ void write_motion(const float *from, const float *to, float *motion) {
 
 } // namespace
 
-Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows)
-    : objects_(objects), catcher_cell_px_(has_sharp_shadows ? 1 : 2),
-      state_size_(size_of(width, height, objects, catcher_cell_px_)), motion_(12 * objects) {}
+Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows,
+                   bool has_gloss)
+    : objects_(objects), has_gloss_(has_gloss), catcher_cell_px_(has_sharp_shadows || has_gloss ? 1 : 2),
+      state_size_(size_of(width, height, objects, catcher_cell_px_, has_gloss)), motion_(12 * objects) {}
+
+std::vector<Layer *> Denoiser::layers() {
+    std::vector<Layer *> layers{&denoising_.objects, &denoising_.catchers};
+    if (has_gloss_)
+        layers.push_back(&denoising_.gloss);
+    return layers;
+}
 
 void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
     denoising_.objects = make_layer(width, height, 1);
     denoising_.catchers = make_layer(width, height, catcher_cell_px_);
-    denoising_.catchers.of_catchers = true;
-    const std::array<Layer *, 2> layers{&denoising_.objects, &denoising_.catchers};
+    denoising_.catchers.holds = LayerLight::change;
+    denoising_.gloss = make_layer(width, height, 1);
+    denoising_.gloss.holds = LayerLight::gloss;
     constexpr std::size_t planes = guide_rows + 2 * light_rows;
-    planes_.assign(planes * (guide_plane(*layers[0]) + guide_plane(*layers[1])), 0);
+    std::size_t size = 0, changes = 0;
+    for (const Layer *layer : layers()) {
+        size += planes * guide_plane(*layer);
+        changes += changes_of(*layer);
+    }
+    planes_.assign(size, 0);
+    changes_.assign(changes, Change{});
     taps_.assign(history_plane(denoising_.objects), 0);
     float *next = planes_.data();
-    for (Layer *layer : layers) {
+    Change *next_changes = changes_.data();
+    for (Layer *layer : layers()) {
+        layer->changes = std::exchange(next_changes, next_changes + changes_of(*layer));
         const auto take = [&] { return std::exchange(next, next + guide_plane(*layer)); };
         std::ranges::generate(layer->guides, take);
         for (auto &light : layer->light)
             std::ranges::generate(light, take);
     }
     denoising_.taps = taps_.data();
-    const auto changes_of = [](const Layer &layer) {
-        const std::int32_t lines = (layer.height + Layer::change_side - 1) / Layer::change_side;
-        return static_cast<std::size_t>(lines * layer.changes_per_row());
-    };
-    changes_.assign(changes_of(*layers[0]) + changes_of(*layers[1]), Change{});
-    layers[0]->changes = changes_.data();
-    layers[1]->changes = changes_.data() + changes_of(*layers[0]);
+    if (has_gloss_)
+        std::ranges::copy(denoising_.catchers.guides, denoising_.gloss.guides);
 }
 
 const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
@@ -118,7 +135,6 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     if (static_cast<std::uint32_t>(denoising_.objects.width) != intrinsics.width ||
         static_cast<std::uint32_t>(denoising_.objects.height) != intrinsics.height)
         resize(intrinsics.width, intrinsics.height);
-    const std::array<Layer *, 2> layers{&denoising_.objects, &denoising_.catchers};
     auto *state = static_cast<std::byte *>(slots.after);
     std::memset(state, 0, rows_offset(objects_));
     StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, sequence, 0, camera},
@@ -136,7 +152,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         now[i].is_visible = objects[i].is_visible;
     }
     std::size_t next = rows_offset(objects_);
-    for (Layer *layer : layers)
+    for (Layer *layer : layers())
         for (int i = 0; i < history_rows; ++i, next += sizeof(float) * history_plane(*layer)) {
             layer->after[i] = reinterpret_cast<float *>(state + next);
             layer->before[i] = before ? reinterpret_cast<const float *>(before + next) : nullptr;
@@ -162,7 +178,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
             then = nullptr;
     }
     if (then && sequence - earlier.sequence > long_gap) {
-        for (Layer *layer : layers)
+        for (Layer *layer : layers())
             std::ranges::fill(layer->before, nullptr);
     } else if (then) {
         for (std::size_t i = 0; i < objects_; ++i)
@@ -179,7 +195,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     const bool sharp_shadows_are_new =
         catcher_cell_px_ == 1 && (header.frames_at_rest == 0 || header.frames < frames_to_find_change);
     denoising_.object_phase = is_coarse ? phase : -1;
-    denoising_.catcher_phase = is_coarse || !sharp_shadows_are_new ? phase : -1;
+    denoising_.catcher_phase = !has_gloss_ && (is_coarse || !sharp_shadows_are_new) ? phase : -1;
     denoising_.objects.takes_turns = denoising_.object_phase >= 0;
     denoising_.catchers.takes_turns = denoising_.catcher_phase >= 0 && denoising_.catchers.cell_px == 1;
     denoising_.finds_change = header.frames_at_rest < frames_to_find_change;
@@ -198,20 +214,22 @@ void Denoiser::clear(const Tile &tile) {
     }
 }
 
-Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles,
-                        ThreadPool &threads) const {
+Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles, ThreadPool &threads) {
     constexpr std::int32_t chunk = Layer::change_side; // rows; a square of Layer::changes has one thread
-    const auto chunks_of = [](const Layer &layer) {
-        return static_cast<std::size_t>(layer.height + chunk - 1) / static_cast<std::size_t>(chunk);
-    };
+    const std::vector<Layer *> all = layers();
     // Calls step(layer, row) for all rows of the layers that have more than `pass` passes.
     const auto for_each_row = [&](int pass, auto step) {
-        const bool has_catchers = pass < denoising_.catchers.filter_passes();
-        const std::size_t of_objects = chunks_of(denoising_.objects),
-                          of_catchers = has_catchers ? chunks_of(denoising_.catchers) : 0;
-        threads.for_each(of_objects + of_catchers, [&](std::size_t i, std::size_t) {
-            const Layer &layer = i < of_objects ? denoising_.objects : denoising_.catchers;
-            const auto first = static_cast<std::int32_t>(i < of_objects ? i : i - of_objects) * chunk;
+        struct Rows {
+            const Layer &layer;
+            std::int32_t first;
+        };
+        std::vector<Rows> chunks;
+        for (const Layer *layer : all)
+            if (layer == all.front() || pass < layer->filter_passes())
+                for (std::int32_t row = 0; row < layer->height; row += chunk)
+                    chunks.push_back({*layer, row});
+        threads.for_each(chunks.size(), [&](std::size_t i, std::size_t) {
+            const auto [layer, first] = chunks[i];
             for (std::int32_t row = first; row < std::min(first + chunk, layer.height); ++row)
                 step(layer, row);
         });

@@ -31,8 +31,9 @@ struct StateSlots {
 
 class Denoiser {
 public:
-    // `width`, `height`: the largest size of an image. `has_sharp_shadows`: else catchers have half the resolution.
-    Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows);
+    // `width`, `height`: the largest size of an image. `has_sharp_shadows`, `has_gloss`: if neither, catchers have
+    // half the resolution.
+    Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows, bool has_gloss);
 
     std::uint64_t state_size() const { return state_size_; } // bytes
 
@@ -48,12 +49,14 @@ public:
     void clear(const Tile &tile);
     // Runs the steps after all tiles have been rendered or cleared. Returns a rectangle of the pixels that virtual
     // objects affect.
-    Rectangle run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles, ThreadPool &threads) const;
+    Rectangle run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles, ThreadPool &threads);
 
 private:
     void resize(std::uint32_t width, std::uint32_t height);
+    std::vector<Layer *> layers();
 
     std::size_t objects_;
+    bool has_gloss_;
     std::int32_t catcher_cell_px_;
     std::uint64_t state_size_;
     std::vector<float> planes_;

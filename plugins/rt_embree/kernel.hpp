@@ -284,11 +284,17 @@ struct Change {
     float count, sum, squares;
 };
 
+enum class LayerLight : std::int32_t {
+    objects, // radiance of virtual objects
+    change,  // change of the diffuse light of catchers
+    gloss    // light that glossy catchers mirror, minus what they mirror without virtual objects
+};
+
 // A grid of the denoiser. Histories have rows of `stride` values, a multiple of 16. Guides and light have `margin`
 // more values on both sides of a row, without a surface.
 struct Layer {
     static constexpr std::int32_t margin = 16;
-    bool of_catchers;                   // else of virtual objects
+    LayerLight holds;
     std::int32_t cell_px;               // side of a cell
     std::int32_t width, height, stride; // cells
     // Each cell gets light in one of four frames, except of surfaces that are sampled in every frame.
@@ -309,8 +315,10 @@ struct Denoising {
     static constexpr std::size_t most_objects = most_surfaces / 4 - 2;
     static constexpr float most_frames = 32; // that count in the means
     // The light of virtual objects in each pixel, and that of catchers; if no lamp casts sharp shadows, in cells of
-    // 2×2 pixels. The guides of `objects` are also those of catchers, except of the flat one.
-    Layer objects, catchers;
+    // 2×2 pixels. The guides of `objects` are also those of catchers, except of the flat one. `gloss` exists only if
+    // the scene has glossy catchers; it shares the guides of `catchers`, whose albedo is their diffuse light without
+    // virtual objects (matt_row).
+    Layer objects, catchers, gloss;
     unsigned *taps; // of pixels at edges: see tap_count in denoise.inl
     Camera camera_before;
     bool camera_moved;

@@ -51,7 +51,7 @@ public:
             throw arhost::Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                                   "option 'show': images of this scene are not denoised; only 'picture' is possible");
         if (settings_.denoise && setup.scene->integrator == ARHOST_INTEGRATOR_PATH && renderer_->state_size() == 0)
-            host_.info("images are not denoised: the scene has a glossy catcher, or too many objects");
+            host_.info("images are not denoised: the scene has too many objects");
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {

@@ -150,10 +150,9 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         brightest_texel_ = arhost::raytracer_common::brightest_texel(*setup.scene);
         place_lights();
     }
-    if (settings.denoise && lights_ && !scene_.view().has_gloss &&
-        setup.scene->objects.count <= Denoising::most_objects)
+    if (settings.denoise && lights_ && setup.scene->objects.count <= Denoising::most_objects)
         denoiser_.emplace(full_intrinsics_.width, full_intrinsics_.height, setup.scene->objects.count,
-                          lights_->casts_sharp_shadows());
+                          lights_->casts_sharp_shadows(), scene_.view().has_gloss);
     remembers_ = denoiser_ && setup.video_format && shows_video(scene_);
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
@@ -274,7 +273,7 @@ bool Renderer::finds_unchanged() const {
                std::ranges::any_of(object.material->emission, [](float channel) { return channel > 0; });
     };
     const Scene &scene = scene_.view();
-    return scene.light_count <= most_lamps &&
+    return scene.light_count <= most_lamps && !scene.has_gloss &&
            std::ranges::none_of(std::span(scene.objects, scene_.placed_objects().size()), shines);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What rt_embree remembers of earlier frames must not show in pictures after something else has changed: no ghosts.
+// Tests that pictures have no ghosts: the memory of rt_embree must not show after something else has changed.
 // The first picture after each event is compared with the first one of a new run.
 #include "arhost_run.hpp"
 

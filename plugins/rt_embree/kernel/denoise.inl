@@ -34,7 +34,8 @@ ARHOST_INLINE Int surfaces_at(const Layer &layer, std::ptrdiff_t at) {
 // Returns the lanes whose surfaces have light in the layer.
 ARHOST_INLINE Bool has_light_in(const Layer &layer, Int surface) {
     const Bool is_real = is_kind(surface, real_surface);
-    return layer.of_catchers ? is_real & (surface != Int(unchanged_surface)) : ~is_real & (surface != Int(0));
+    return layer.holds == LayerLight::objects ? ~is_real & (surface != Int(0))
+                                              : is_real & (surface != Int(unchanged_surface));
 }
 
 // Normals with 10 bits per component.
@@ -119,7 +120,17 @@ ARHOST_INLINE void write_catchers(const Frame &frame, const Scratch &scratch, in
             write(layer.light[0][i], select(is_real, change, Float(0.0f)));
         }
         const Bool is_sampled = (phase_of_lanes() == Int(phase)) | bool_of(phase < 0);
-        return write(layer.light[0][variance_light], select(is_sampled, Float(sampled), Float(not_sampled)));
+        write(layer.light[0][variance_light], select(is_sampled, Float(sampled), Float(not_sampled)));
+        if (!frame.scene.has_gloss)
+            return;
+        for (int i = 0; i < 3; ++i) {
+            const auto mean = [&](int row) __attribute__((always_inline)) {
+                return load(scratch.sum[row + i] + first_pixel) * scale;
+            };
+            write(layer.guides[albedo_guide + i], mean(matt_row));
+            write(denoising.gloss.light[0][i], select(is_real, mean(light_row) - mean(covered_row), Float(0.0f)));
+        }
+        return write(denoising.gloss.light[0][variance_light], Float(sampled));
     }
     constexpr int cell_count = 4;
     const auto pixel_of = [](int cell, int i) __attribute__((always_inline)) {
@@ -410,8 +421,10 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         Float most = most_frames_of(denoising, layer, x, row);
         // The surroundings have no noise in mirrors and glass.
         const Bool shows_surroundings = is_kind(surface, specular_surface) & (surface < Int(mirrored_unit));
-        if (denoising.camera_moved || denoising.before_from_now) // highlights move over the surface
-            most = select(is_kind(surface, glossy_surface), min(most, most_of_glossy), most);
+        if (denoising.camera_moved || denoising.before_from_now) { // highlights move over the surface
+            const Bool is_glossy = is_kind(surface, glossy_surface) | bool_of(layer.holds == LayerLight::gloss);
+            most = select(is_glossy, min(most, most_of_glossy), most);
+        }
         if (denoising.camera_moved) {
             // Curved mirrors and glass show a surface elsewhere than store_seen() assumes.
             most = select(is_kind(surface, specular_surface), min(most, Float(4.0f)), most);
@@ -486,7 +499,7 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
         const Float own = luminance(light);
         Float variance = load(from[variance_light] + at);
         const Bool has_light = variance > Float(no_light);
-        const Bool fills = ~has_light & bool_of(!layer.of_catchers); // resolve() fills catchers
+        const Bool fills = ~has_light & bool_of(layer.holds == LayerLight::objects); // resolve() fills catchers
         if (pass == 0)
             if (const Bool needed = (variance == Float(unknown)) | fills; any(needed))
                 variance = select(needed, variance_of_neighbours(layer, from, at, row, surface), variance);
@@ -726,8 +739,8 @@ ARHOST_INLINE void write_untouched(const Frame &frame, int x, int row, int width
 class InterpolatedCatchers {
 public:
     // `x`: even.
-    ARHOST_INLINE InterpolatedCatchers(const Frame &frame, int x, int row)
-        : layer_(frame.denoising->catchers), light_(layer_.light[(layer_.filter_passes() + 1) & 1]),
+    ARHOST_INLINE InterpolatedCatchers(const Frame &frame, const Layer &layer, int x, int row)
+        : layer_(layer), light_(layer_.light[(layer_.filter_passes() + 1) & 1]),
           flat_surface_(frame.denoising->flat_surface), x_(x), row_(row) {}
 
     // Returns the light of surfaces that the pixels, or those beside them, show.
@@ -844,7 +857,9 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
             continue;
         }
         LinearBlock linear{black(), black()};
-        const InterpolatedCatchers catchers(frame, x, row);
+        const InterpolatedCatchers catchers(frame, denoising.catchers, x, row),
+            glosses(frame, frame.scene.has_gloss ? denoising.gloss : denoising.catchers, x, row);
+        Vec3 gloss = black();
         // `light`, `albedo`: of virtual objects.
         const auto add = [&](Int surface, Vec3 light, Vec3 albedo, Float share, Bool here)
             __attribute__((always_inline)) {
@@ -854,6 +869,8 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
             if (const Bool changed = is_real & has_light_in(denoising.catchers, surface); any(changed))
                 transmittance = transmittance + select(changed, catchers.of(surface), black());
             linear.transmittance = linear.transmittance + select(is_real, transmittance * share, black());
+            if (frame.scene.has_gloss && any(is_real & has_light_in(denoising.catchers, surface)))
+                gloss = gloss + select(is_real, glosses.of(surface) * share, black());
         };
         if (is_picture)
             add(own_surface, load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
@@ -875,7 +892,19 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
                     edges);
             }
         }
-        linear = {bounded_for_halves(linear.added), bounded_for_halves(linear.transmittance)};
+        linear.transmittance = bounded_for_halves(linear.transmittance);
+        if (frame.scene.has_gloss && is_picture) {
+            const auto positive = [](Vec3 a) __attribute__((always_inline)) {
+                return Vec3{max(a.x, Float(0.0f)), max(a.y, Float(0.0f)), max(a.z, Float(0.0f))};
+            };
+            linear.added = linear.added + positive(gloss);
+            const Layer &real = denoising.catchers;
+            const Float across = to_float(lane_numbers() + Int(x)) + Float(0.5f),
+                        down(static_cast<float>(row) + 0.5f);
+            remove_covered(frame, positive(-gloss), load3(real.guides + albedo_guide, guide_at(real, x, row)), across,
+                           down, linear);
+        }
+        linear.added = bounded_for_halves(linear.added);
         bool affected = false;
         if (frame.linear) {
             affected = write_linear(frame, x, row, width, 1, linear, lanes);

@@ -361,11 +361,9 @@ struct LinearBlock {
     Vec3 added, transmittance;
 };
 
-// Returns the light of the video at the pixels of the block whose first pixel is (x, y).
-ARHOST_INLINE Vec3 video_at(const Frame &frame, int x, int y) {
+// Returns the light of the video. `column`, `row`: px, pixel centres at halves.
+ARHOST_INLINE Vec3 video_at(const Frame &frame, Float column, Float row) {
     const Video &video = frame.path.video;
-    const Float column = to_float(lane_numbers() & Int(block - 1)) + Float(static_cast<float>(x) + 0.5f),
-                row = to_float(lane_numbers() >> Int(2)) + Float(static_cast<float>(y) + 0.5f);
     return sample_texture(frame.scene, video.image, column * Float(video.pixel_width),
                           row * Float(video.pixel_height))
         .colour;
@@ -373,15 +371,17 @@ ARHOST_INLINE Vec3 video_at(const Frame &frame, int x, int y) {
 
 // Removes the light that catchers mirror only without virtual objects. It is part of the video, so that the
 // transmittance applies to it, too. A saturated video shows less than that; there, the catcher's diffuse light
-// remains. `covered`, `matt`: as in SumRow, means over the samples that hit no virtual object.
-ARHOST_INLINE void remove_covered(const Frame &frame, Vec3 covered, Vec3 matt, int x, int y, LinearBlock &linear) {
+// remains. `covered`, `matt`: as in SumRow, means over the samples that hit no virtual object. `column`, `row`: as in
+// video_at().
+ARHOST_INLINE void remove_covered(const Frame &frame, Vec3 covered, Vec3 matt, Float column, Float row,
+                                  LinearBlock &linear) {
     if (!any(largest(covered) > Float(0.0f)))
         return;
     if (!frame.path.video.image.texels) {
         linear.added = linear.added - linear.transmittance * covered;
         return;
     }
-    const Vec3 video = video_at(frame, x, y);
+    const Vec3 video = video_at(frame, column, row);
     const auto remaining = [](Float part, Float diffuse, Float whole) __attribute__((always_inline)) {
         const Float saturated = min(max(whole * Float(5.0f) - Float(4.0f), Float(0.0f)), Float(1.0f)); // from 0.8 on
         const Float least = min(diffuse * saturated / max(whole, Float(1e-6f)), Float(1.0f));
@@ -417,7 +417,9 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
         const auto mean_behind = [&](int row) __attribute__((always_inline)) {
             return Vec3{mean(row), mean(row + 1), mean(row + 2)} * share;
         };
-        remove_covered(frame, mean_behind(covered_row), mean_behind(matt_row), x, y, linear);
+        const Float column = to_float(lane_numbers() & Int(block - 1)) + Float(static_cast<float>(x) + 0.5f),
+                    row = to_float(lane_numbers() >> Int(2)) + Float(static_cast<float>(y) + 0.5f);
+        remove_covered(frame, mean_behind(covered_row), mean_behind(matt_row), column, row, linear);
     }
     linear.added = bounded_for_halves(linear.added);
     return linear;

@@ -24,9 +24,9 @@ scene::Settings path_traced(float background) {
 }
 
 // Objects of several materials on a table, in soft light.
-SceneBuilder still_life() {
+SceneBuilder still_life(const arhost_material &of_table = diffuse(0.4f, 0.4f, 0.4f)) {
     SceneBuilder scene(path_traced(0.4f));
-    scene.add_mesh("table", square(2000), diffuse(0.4f, 0.4f, 0.4f), ARHOST_ROLE_CATCHER);
+    scene.add_mesh("table", square(2000), of_table, ARHOST_ROLE_CATCHER);
     scene.add_ball("red", {-35, 0, 25, 25}, diffuse(0.7f, 0.2f, 0.1f));
     scene.add_mesh("box", moved(cube(15), {30, 20, 15}), diffuse(0.7f, 0.7f, 0.7f));
     scene.add_ball("gold", {25, -30, 15, 15}, metallic_roughness({0.9f, 0.7f, 0.3f}, 1, 0.4f));
@@ -64,10 +64,10 @@ double difference(
 }
 
 LinearPicture picture_of(SceneBuilder scene, const Options &options, const arhost_camera &view,
-                         std::optional<double> time_s = {}) {
+                         std::optional<double> time_s = {}, const Video *video = nullptr) {
     LinearTracer tracer(std::move(scene), options, "rt_embree");
-    EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK) << tracer.log();
-    return tracer.render(view, 0, nullptr, time_s);
+    EXPECT_EQ(tracer.start(view.intrinsics, video), ARHOST_STATUS_OK) << tracer.log();
+    return tracer.render(view, 0, video, time_s);
 }
 
 class Denoising : public testing::Test {
@@ -103,6 +103,25 @@ TEST(DenoisingOfMirrors, ConvergesWhileTheCameraRests) {
     for (std::uint64_t i = 1; i < 16; ++i)
         picture = tracer.render(turned(0), i);
     EXPECT_LT(difference(picture, truth, shows_them), 0.4 * noise);
+}
+
+// The table mirrors the objects, and not what they cover.
+TEST(DenoisingOfGloss, ConvergesWhileTheCameraRests) {
+    const auto make = [] { return still_life(metallic_roughness({0.2f, 0.2f, 0.2f}, 0, 0.15f)); };
+    const arhost_camera view = camera({0, -220, 70}, {0, 0, 10}, {0, 0, 1});
+    const Video video(view.intrinsics, 140);
+    LinearTracer tracer(make(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(view.intrinsics, &video), ARHOST_STATUS_OK) << tracer.log();
+    const LinearPicture truth = picture_of(make(), converged, view, {}, &video),
+                        matt = picture_of(still_life(), converged, view, {}, &video);
+    const auto shows_table = [&](std::uint32_t x, std::uint32_t y) { return truth.value(x, y, 4) > 0.2f; };
+    const double noise = difference(picture_of(make(), noisy, view, {}, &video), truth, shows_table),
+                 gloss = difference(matt, truth, shows_table);
+    LinearPicture picture = tracer.render(view, 0, &video);
+    for (std::uint64_t i = 1; i < 16; ++i)
+        picture = tracer.render(view, i, &video);
+    EXPECT_LT(difference(picture, truth, shows_table), 0.2 * noise);
+    EXPECT_LT(difference(picture, truth, shows_table), 0.4 * gloss);
 }
 
 TEST_F(Denoising, FollowsTheCamera) {
