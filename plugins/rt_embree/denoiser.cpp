@@ -28,8 +28,8 @@ struct ObjectState {
 };
 constexpr std::uint32_t state_version = 3;
 constexpr std::size_t alignment = 64; // of the rows, bytes
-// If objects move while so many frames are missing, such as those in which a marker is lost, the history is of no
-// use. A slow ray tracer misses fewer.
+// The history is of no use after so many missing frames in which objects have moved, for example because a marker was
+// lost. A slow ray tracer misses fewer frames.
 constexpr std::uint32_t long_gap = 16;
 
 std::size_t aligned(std::size_t size) {
