@@ -460,8 +460,7 @@ def main():
         name, picture, view = job.split("/")
         os.makedirs(os.path.join(folder, name), exist_ok=True)
         build(next(each for each in rooms.ROOMS + rooms.OTHER_ROOMS if each.name == name), picture, folder, bunny)
-        moving = view.startswith("m")
-        set_camera(rooms.cameras(moving)[int(view.lstrip("m"))], picture == "probe")
+        set_camera(rooms.camera_of(view), picture == "probe")
         set_quality(samples, 1 if picture == "again" else 0)
         if picture == "truth": # before the picture, which tells that the job is done
             write_labels(os.path.join(folder, name, f"labels-{view}.npz"))

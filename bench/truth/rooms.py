@@ -120,8 +120,9 @@ def camera(azimuth_degrees, elevation_degrees, distance_mm):
                    LOOK_AT[2] + distance_mm * math.sin(elevation)))
 
 
-def cameras(moving=False):
-    if not moving:
-        return [camera(*view) for view in VIEWS]
-    steps = [frame / (MOVING_FRAMES - 1) for frame in range(MOVING_FRAMES)]
-    return [camera(-25 + 50 * at, 30 + 14 * math.sin(math.pi * at), 560 - 60 * at) for at in steps]
+def camera_of(view):
+    """`view`: an index into VIEWS as text, or `m` and the number of a frame of the moving camera."""
+    if not view.startswith("m"):
+        return camera(*VIEWS[int(view)])
+    at = int(view[1:]) / (MOVING_FRAMES - 1)
+    return camera(-25 + 50 * at, 30 + 14 * math.sin(math.pi * at), 560 - 60 * at)
