@@ -269,8 +269,8 @@ void LightSources::place(std::span<const PlacedObject> placed) {
     choose(object_of, middle, extent);
 }
 
-// Sets the chances of the light sources. A lamp, an emissive object and the environment are chosen in proportion to
-// the light that they send to the middle of the virtual objects, and the triangles of an object in proportion to
+// Sets the chances of the light sources. A lamp, an emissive object and the environment are chosen about in proportion
+// to the light that they send to the middle of the virtual objects, and the triangles of an object in proportion to
 // their areas. `object_of`: the object of each emissive record. `extent`: radius of the virtual objects, mm.
 void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 middle, double extent) {
     const std::size_t count = records_.size() / source_rows, lamps = lamp_count(), emissive = object_of.size();
@@ -315,6 +315,14 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
     // middle.
     constexpr double even = 0.1;
     const double share = 1 / static_cast<double>(count - emissive + emitters);
+    // Lamps and the environment, whose shadows are seen everywhere, and emissive objects, which shine on what is near,
+    // have at least a third of the rest each.
+    double of_lamp = 1, of_emitter = 1; // factors of their light
+    if (of_room > 0 && sum > of_room) {
+        const double lamp_share = std::clamp(of_room / sum, 1 / 3.0, 2 / 3.0);
+        of_lamp = lamp_share * sum / of_room;
+        of_emitter = (1 - lamp_share) * sum / (sum - of_room);
+    }
     const auto chance_of = [&](double part) { return sum > 0 ? (1 - even) * part / sum + even * share : share; };
     cumulative_.assign(count, 1);
     double before = 0;
@@ -322,10 +330,10 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
         float *to = records_.data() + i * source_rows;
         double chance = 0;
         if (i < lamps || i >= lamps + emissive) {
-            chance = chance_of(light[i]);
+            chance = chance_of(of_lamp * light[i]);
         } else {
             const std::uint32_t object = object_of[i - lamps];
-            const double per_area = chance_of(light_of[object]) / area_of[object];
+            const double per_area = chance_of(of_emitter * light_of[object]) / area_of[object];
             chance = per_area * to[area_row];
             emitters_[object].density = static_cast<float>(emitters_[object].ball_radius > 0 ? chance : per_area);
         }
