@@ -127,10 +127,19 @@ Traced raytracer_and_composite(const VideoFrame &video, const std::string &scene
     arhost_render_info info{};
     const double ms = cpu_ms_of(frames, [&](int i) {
         const auto &frame = trajectory.frames[static_cast<std::size_t>(i) % trajectory.frames.size()];
-        const arhost_render_request request{
-            sizeof request, 0,       frame.frame, 0,       arhost::camera::camera_of(frame.view.value(), camera),
-            nullptr,        nullptr, nullptr,     nullptr, 0,
-            nullptr};
+        const arhost_render_request request{sizeof request,
+                                            0,
+                                            frame.frame,
+                                            0,
+                                            arhost::camera::camera_of(frame.view.value(), camera),
+                                            nullptr,
+                                            nullptr,
+                                            nullptr,
+                                            nullptr,
+                                            0,
+                                            nullptr,
+                                            0,
+                                            0};
         const arhost_image image{sizeof image, 4 * camera.width, camera.width, camera.height,
                                  slot.data(),  nullptr,          nullptr};
         info = {};

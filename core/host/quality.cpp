@@ -95,7 +95,8 @@ bool QualityController::add(const Quality &quality, std::chrono::nanoseconds ren
         return false;
     median_before_raise_ = median;
     windows_since_raise_ = 0;
-    failed_from_median_ = 0;
+    if (level_ - 1 == failed_level_)
+        failed_from_median_ = 0;
     change(level_ - 1);
     return true;
 }

@@ -189,7 +189,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
         statistics.stages.add("device", device);
     if (const Frame *frame = parts_.flow.find(command.sequence); frame && quality_) {
         if (result.status >= 0) {
-            set_adaptable({result.render.full_samples, result.render.coarsest_shading_px});
+            set_adaptable({result.render.full_samples, result.render.coarsest_shading_px < 2 ? 0u : 2u});
             statistics.quality_changes += quality_->add(frame->quality, busy, parts_.context.reactor.now());
         }
         statistics.quality = quality_->current();
@@ -245,9 +245,10 @@ void Raytracer::set_adaptable(const Adaptable &adaptable) {
     adaptable_ = adaptable;
     start_quality();
     if (is_first && adaptable == Adaptable() && quality_->is_lowest() && parts_.configuration.min_scale < 1)
-        component().log(ARHOST_SEVERITY_WARNING, component().description().short_name() +
-                                                     " can render neither smaller images nor fewer samples; "
-                                                     "'live.target_fps' has no effect");
+        component().log(ARHOST_SEVERITY_WARNING,
+                        component().description().short_name() +
+                            " can render neither smaller images nor fewer samples, nor shade fewer pixels; "
+                            "'live.target_fps' has no effect");
 }
 
 } // namespace arhost::host

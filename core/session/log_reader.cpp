@@ -104,7 +104,7 @@ RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
         {{"rendered", ARHOST_OVERLAY_RENDERED}, {"held", ARHOST_OVERLAY_HELD}, {"none", ARHOST_OVERLAY_NONE}});
     frame.scale = object.value("overlay_scale", 1.0);
     frame.samples = object.value("overlay_samples", std::uint32_t{0});
-    frame.shading_px = object.value("overlay_shading_px", std::uint32_t{1});
+    frame.shading_px = std::max(1u, object.value("overlay_shading_px", std::uint32_t{1})); // 0: as 1
     for (const nlohmann::json &target : object.at("targets"))
         read_target(line, target, frame);
     if (const auto search = object.find("search"); search != object.end())

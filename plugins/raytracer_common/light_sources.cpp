@@ -269,15 +269,16 @@ void LightSources::place(std::span<const PlacedObject> placed) {
     choose(object_of, middle, extent);
 }
 
-// Sets the chances of the light sources. A lamp, an emissive object and the environment are chosen about in proportion
-// to the light that they send to the middle of the virtual objects, and the triangles of an object in proportion to
-// their areas. `object_of`: the object of each emissive record. `extent`: radius of the virtual objects, mm.
+// Sets the chances of the light sources. A lamp, an emissive object and the environment are chosen about in
+// proportion to the light that they send to the middle of the virtual objects, and the triangles of an object in
+// proportion to their areas. `object_of`: the object of each emissive record. `extent`: radius of the virtual
+// objects, mm.
 void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 middle, double extent) {
     const std::size_t count = records_.size() / source_rows, lamps = lamp_count(), emissive = object_of.size();
     // Sources nearer than the objects' extent count as if they were that far away.
     std::vector<double> light(count);
     std::vector<double> light_of(arena_.objects.count), area_of(arena_.objects.count);
-    double sum = 0, of_room = 0;
+    double sum = 0, of_room = 0, of_objects = 0; // of_objects: emissive ones
     for (std::size_t i = 0; i < count; ++i) {
         const float *from = records_.data() + i * source_rows;
         const Vec3 to_middle = middle - vector_of(from + position_row);
@@ -292,6 +293,7 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
         if (i >= lamps && i < lamps + emissive) {
             light_of[object_of[i - lamps]] += light[i];
             area_of[object_of[i - lamps]] += from[area_row];
+            of_objects += light[i];
         } else {
             of_room += light[i];
         }
@@ -315,13 +317,14 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
     // middle.
     constexpr double even = 0.1;
     const double share = 1 / static_cast<double>(count - emissive + emitters);
-    // Lamps and the environment, whose shadows are seen everywhere, and emissive objects, which shine on what is near,
-    // have at least a third of the rest each.
+    // Lamps and the environment, whose shadows are seen everywhere, and emissive objects, which shine on what is
+    // near, have at least a third of the rest each, unless their light is negligible.
     double of_lamp = 1, of_emitter = 1; // factors of their light
-    if (of_room > 0 && sum > of_room) {
-        const double lamp_share = std::clamp(of_room / sum, 1 / 3.0, 2 / 3.0);
+    if (of_room > 0 && of_objects > 0) {
+        const auto least = [&](double part) { return std::min(1 / 3.0, 30 * part / sum); };
+        const double lamp_share = std::clamp(of_room / sum, least(of_room), 1 - least(of_objects));
         of_lamp = lamp_share * sum / of_room;
-        of_emitter = (1 - lamp_share) * sum / (sum - of_room);
+        of_emitter = (1 - lamp_share) * sum / of_objects;
     }
     const auto chance_of = [&](double part) { return sum > 0 ? (1 - even) * part / sum + even * share : share; };
     cumulative_.assign(count, 1);

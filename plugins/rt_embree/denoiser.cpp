@@ -19,7 +19,7 @@ struct StateHeader {
     std::uint32_t version, width, height;
     std::uint32_t first, frames;  // number of the history's first frame, and of the frames since
     std::uint32_t sequence;       // of the frame, with gaps
-    std::uint32_t frames_at_rest; // number of frames since an object has moved
+    std::uint32_t frames_at_rest; // number of frames since an object has moved, at most frames_to_find_change
     Camera camera;
 };
 struct ObjectState {
@@ -30,7 +30,7 @@ constexpr std::uint32_t state_version = 3;
 constexpr std::size_t alignment = 64; // of the rows, bytes
 // The history is of no use after so many missing frames in which objects have moved, for example because a marker was
 // lost. A slow ray tracer misses fewer frames.
-constexpr std::uint32_t long_gap = 16;
+constexpr std::int32_t long_gap = 16;
 
 std::size_t aligned(std::size_t size) {
     return (size + alignment - 1) / alignment * alignment;
@@ -144,13 +144,19 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         std::memcpy(&earlier, before, sizeof earlier);
     if (earlier.version != state_version || earlier.width != header.width || earlier.height != header.height)
         before = nullptr;
-    else
-        header.first = earlier.first, header.frames = earlier.frames + 1;
     auto *now = reinterpret_cast<ObjectState *>(state + sizeof header);
     for (std::size_t i = 0; i < objects.size(); ++i) {
         std::copy_n(objects[i].world_from_object, 12, now[i].world_from_object);
         now[i].is_visible = objects[i].is_visible;
     }
+    const auto *then = before ? reinterpret_cast<const ObjectState *>(before + sizeof header) : nullptr;
+    if (then && std::memcmp(then, now, sizeof(ObjectState) * objects_) == 0)
+        then = nullptr; // nothing has moved
+    const bool moves = then || deforms;
+    if (moves && before && static_cast<std::int32_t>(sequence - earlier.sequence) > long_gap)
+        before = nullptr, then = nullptr;
+    if (before)
+        header.first = earlier.first, header.frames = earlier.frames + 1;
     std::size_t next = rows_offset(objects_);
     for (Layer *layer : layers())
         for (int i = 0; i < history_rows; ++i, next += sizeof(float) * history_plane(*layer)) {
@@ -168,19 +174,12 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     denoising_.number = header.first + header.frames;
     const std::int32_t phase = phases[denoising_.number % 4];
     denoising_.first_random_in_turn = (header.first + header.frames / 4) * samples;
-    const ObjectState *then = nullptr;
     if (before) {
         denoising_.camera_before = earlier.camera;
         denoising_.camera_moved = !std::ranges::equal(earlier.camera.eye, camera.eye) ||
                                   !std::ranges::equal(earlier.camera.world_from_camera, camera.world_from_camera);
-        then = reinterpret_cast<const ObjectState *>(before + sizeof header);
-        if (std::memcmp(then, now, sizeof(ObjectState) * objects_) == 0)
-            then = nullptr;
     }
-    if (then && sequence - earlier.sequence > long_gap) {
-        for (Layer *layer : layers())
-            std::ranges::fill(layer->before, nullptr);
-    } else if (then) {
+    if (then) {
         for (std::size_t i = 0; i < objects_; ++i)
             write_motion(now[i].world_from_object, then[i].world_from_object, motion_.data() + 12 * i);
         denoising_.before_from_now = motion_.data();
@@ -188,7 +187,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     // Shadows and reflections of what has moved change the light of what has not. Where the change is smaller than
     // the noise, it is found in the frames that follow.
     constexpr std::uint32_t frames_to_find_change = 8;
-    header.frames_at_rest = then || deforms ? 0
+    header.frames_at_rest = moves && before ? 0
                             : before        ? std::min(earlier.frames_at_rest + 1, frames_to_find_change)
                                             : frames_to_find_change;
     const bool is_coarse = shading_px > 1;

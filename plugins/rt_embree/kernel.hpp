@@ -230,6 +230,9 @@ struct Surroundings {
     std::int32_t axes[2]; // world axes of the plane
     // Coordinate of the plane along the third axis; the first texel's corner, and the sides of texels, along `axes`.
     float plane_mm, low[2], texel_mm[2];
+    float side;       // 1 or −1: the side of the plane that is remembered, along the third axis
+    bool knows_plane; // whether `before` has points of this plane
+    int normal_axis() const { return 3 - axes[0] - axes[1]; }
 };
 
 struct Camera {

@@ -72,10 +72,10 @@ public:
             info.region_width = static_cast<std::uint32_t>(drawn.x1 - drawn.x0);
             info.region_height = static_cast<std::uint32_t>(drawn.y1 - drawn.y0);
         }
-        if (info.struct_size >= sizeof info) { // an older host's struct lacks these fields
+        if (info.struct_size > offsetof(arhost_render_info, full_samples)) // an older host's struct lacks the fields
             info.full_samples = settings_.samples;
+        if (info.struct_size > offsetof(arhost_render_info, coarsest_shading_px))
             info.coarsest_shading_px = renderer_->state_size() > 0 ? 2 : 0;
-        }
     }
 
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};

@@ -387,7 +387,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     std::optional<Surroundings> surroundings;
     if (frame.denoising && remembers_) {
         frame.surroundings = &surroundings.emplace(
-            surroundings_in(state.from(denoiser_->state_size()), scene_, windows.wide_catcher()));
+            surroundings_in(state.from(denoiser_->state_size()), scene_, windows.wide_catcher(), frame.camera));
         constexpr std::int32_t rows = 16;
         threads_.for_each(Surroundings::height / rows, [&](std::size_t i, std::size_t) {
             for (std::int32_t row = 0; row < rows; ++row)

@@ -11,7 +11,7 @@ namespace {
 struct Header {
     std::uint32_t version;
     std::int32_t catcher, axes[2];
-    float plane_mm, low[2], texel_mm[2];
+    float plane_mm, low[2], texel_mm[2], side;
 };
 constexpr std::uint32_t version = 1;
 constexpr std::size_t header_size = 64, plane_size = std::size_t{Surroundings::width} * Surroundings::height;
@@ -23,14 +23,16 @@ std::uint64_t surroundings_state_size() {
     return header_size + Surroundings::row_count * plane_size * sizeof(float);
 }
 
-Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, std::int32_t flat_catcher) {
+Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, std::int32_t flat_catcher,
+                             const Camera &camera) {
     Surroundings surroundings{};
-    Header header{version, flat_catcher, {}, 0, {}, {}};
+    Header header{version, flat_catcher, {}, 0, {}, {}, 0};
     if (flat_catcher >= 0) {
         const Box &box = scene.visible_boxes()[static_cast<std::size_t>(flat_catcher)];
         const auto width = [&](int axis) { return box.max[axis] - box.min[axis]; };
         const int normal = width(0) <= std::min(width(1), width(2)) ? 0 : width(1) <= width(2) ? 1 : 2;
         header.plane_mm = static_cast<float>(box.min[normal]);
+        header.side = camera.eye[normal] > header.plane_mm ? 1.0f : -1.0f;
         for (int i = 0; i < 2; ++i) {
             const int axis = header.axes[i] = (normal + 1 + i) % 3;
             constexpr double most_mm = 2000; // farther away, texels are of little use
@@ -42,8 +44,9 @@ Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, 
     }
     std::byte *const after = static_cast<std::byte *>(slots.after);
     const std::byte *before = static_cast<const std::byte *>(slots.before);
-    if (before && std::memcmp(before, &header, sizeof header) != 0)
+    if (before && std::memcmp(before, &header.version, sizeof header.version) != 0)
         before = nullptr;
+    surroundings.knows_plane = before && std::memcmp(before, &header, sizeof header) == 0;
     std::memset(after, 0, header_size);
     std::memcpy(after, &header, sizeof header);
     for (std::size_t i = 0; i < Surroundings::row_count; ++i) {
@@ -54,6 +57,7 @@ Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, 
     surroundings.catcher = header.catcher;
     std::ranges::copy(header.axes, surroundings.axes);
     surroundings.plane_mm = header.plane_mm;
+    surroundings.side = header.side;
     std::ranges::copy(header.low, surroundings.low);
     std::ranges::copy(header.texel_mm, surroundings.texel_mm);
     return surroundings;

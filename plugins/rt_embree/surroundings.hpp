@@ -14,6 +14,7 @@ std::uint64_t surroundings_state_size(); // bytes
 
 // Returns the memory of the surroundings in a state. `slots.after` must not be NULL. `flat_catcher`: index of a
 // catcher whose box is flat along a world axis, or −1.
-Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, std::int32_t flat_catcher);
+Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, std::int32_t flat_catcher,
+                             const Camera &camera);
 
 } // namespace rt_embree

@@ -91,7 +91,8 @@ public:
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
-        const bool has_video = request.struct_size >= sizeof request; // an older host's struct lacks the field
+        // An older host's struct lacks the field.
+        const bool has_video = request.struct_size > offsetof(arhost_render_request, video);
         const Rectangle drawn = renderer_->render(request.camera, image, request.motion,
                                                   has_video ? request.video : nullptr, request.sequence);
         info.has_region = 1;

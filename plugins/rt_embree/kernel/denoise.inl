@@ -298,6 +298,10 @@ ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int ro
 ARHOST_INLINE Vec3 light_without_fireflies(const Layer &layer, std::ptrdiff_t at, int row, Int surface) {
     // The nearest cells that were sampled, too.
     const int apart = layer.takes_turns ? 2 : 1;
+    const auto brightness_of = [&](Vec3 light) __attribute__((always_inline)) { // gloss may be negative
+        const Float value = luminance(light);
+        return layer.holds == LayerLight::gloss ? abs(value) : value;
+    };
     Float brightest(0.0f), count(0.0f);
     for (int dy = -apart; dy <= apart; dy += apart)
         for (int dx = -apart; dx <= apart; dx += apart) {
@@ -306,12 +310,12 @@ ARHOST_INLINE Vec3 light_without_fireflies(const Layer &layer, std::ptrdiff_t at
             const std::ptrdiff_t there = at + dy * layer.guide_stride() + dx;
             const Bool same = (surfaces_at(layer, there) == surface) &
                               (load(layer.light[0][variance_light] + there) == Float(sampled));
-            brightest = max(brightest, select(same, luminance(load3(layer.light[0], there)), Float(0.0f)));
+            brightest = max(brightest, select(same, brightness_of(load3(layer.light[0], there)), Float(0.0f)));
             count = count + select(same, Float(1.0f), Float(0.0f));
         }
     const Float limit = select(count < Float(3.0f), Float(far_away), brightest * Float(4.0f) + Float(0.1f));
     const Vec3 light = load3(layer.light[0], at);
-    const Float value = luminance(light);
+    const Float value = brightness_of(light);
     return light * select(value > limit, limit / max(value, Float(1e-6f)), Float(1.0f));
 }
 
@@ -812,7 +816,9 @@ ARHOST_INLINE Vec3 viewed(const Frame &frame, const InterpolatedCatchers &catche
     case View::history: {
         const std::ptrdiff_t kept = history_at(objects, x, row),
                              kept_cell = history_at(cells, x / cells.cell_px, row / cells.cell_px);
-        return grey(value(objects.after[frames_history] + kept, cells.after[frames_history] + kept_cell) *
+        // Histories have no margin that pick() may read.
+        const Float of_cells = gather(cells.after[frames_history] + kept_cell, select(is_caught, cell, Int(0)));
+        return grey(select(is_caught, of_cells, load(objects.after[frames_history] + kept)) *
                     Float(1 / Denoising::most_frames));
     }
     case View::variance: {
@@ -848,7 +854,8 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
     for (std::int32_t x = 0; x < layer.width; x += lanes) {
         const int width = layer.width - x < lanes ? layer.width - x : lanes;
         const Int taps = load(denoising.taps + history_at(layer, x, row));
-        const std::ptrdiff_t at = guide_at(layer, x, row);
+        const std::ptrdiff_t at = guide_at(layer, x, row),
+                             at_real = frame.scene.has_gloss ? guide_at(denoising.catchers, x, row) : 0;
         const Int own_surface = surfaces_at(layer, at);
         const bool is_picture = frame.view == View::picture;
         const Bool plain = is_picture ? taps == Int(static_cast<int>(only_own)) : bool_of(true);
@@ -859,9 +866,11 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
         LinearBlock linear{black(), black()};
         const InterpolatedCatchers catchers(frame, denoising.catchers, x, row),
             glosses(frame, frame.scene.has_gloss ? denoising.gloss : denoising.catchers, x, row);
-        Vec3 gloss = black();
+        // Of glossy catchers; `matt`: matt_row.
+        Vec3 gloss = black(), matt = black();
+        Float real_share(0.0f);
         // `light`, `albedo`: of virtual objects.
-        const auto add = [&](Int surface, Vec3 light, Vec3 albedo, Float share, Bool here)
+        const auto add = [&](Int surface, Vec3 light, Vec3 albedo, Vec3 of_matt, Float share, Bool here)
             __attribute__((always_inline)) {
             const Bool is_virtual = here & has_light_in(layer, surface), is_real = here & ~is_virtual;
             linear.added = linear.added + select(is_virtual, light * albedo * share, black());
@@ -869,11 +878,17 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
             if (const Bool changed = is_real & has_light_in(denoising.catchers, surface); any(changed))
                 transmittance = transmittance + select(changed, catchers.of(surface), black());
             linear.transmittance = linear.transmittance + select(is_real, transmittance * share, black());
-            if (frame.scene.has_gloss && any(is_real & has_light_in(denoising.catchers, surface)))
-                gloss = gloss + select(is_real, glosses.of(surface) * share, black());
+            real_share = real_share + select(is_real, share, Float(0.0f));
+            if (!frame.scene.has_gloss)
+                return;
+            if (const Bool changed = is_real & has_light_in(denoising.catchers, surface); any(changed)) {
+                gloss = gloss + select(changed, glosses.of(surface) * share, black());
+                matt = matt + select(changed, of_matt * share, black());
+            }
         };
         if (is_picture)
-            add(own_surface, load3(from, at), load3(guides + albedo_guide, at), Float(1.0f), plain);
+            add(own_surface, load3(from, at), load3(guides + albedo_guide, at),
+                load3(denoising.catchers.guides + albedo_guide, at_real), Float(1.0f), plain);
         else
             linear = {select(own_surface == Int(0), black(), viewed(frame, catchers, x, row, own_surface)),
                       select(own_surface == Int(0), white(), black())};
@@ -888,8 +903,10 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
                     select(here, Int(static_cast<int>(at)) + lane_numbers() + dy * Int(layer.guide_stride()) + dx,
                            Int(Layer::margin));
                 const Int surface = select(here, bits_of(gather(guides[surface_guide], there)), Int(0));
-                add(surface, gather3(from, there), gather3(guides + albedo_guide, there), Float(1.0f / tap_count),
-                    edges);
+                const Vec3 of_matt =
+                    frame.scene.has_gloss ? gather3(denoising.catchers.guides + albedo_guide, there) : black();
+                add(surface, gather3(from, there), gather3(guides + albedo_guide, there), of_matt,
+                    Float(1.0f / tap_count), edges);
             }
         }
         linear.transmittance = bounded_for_halves(linear.transmittance);
@@ -898,11 +915,10 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
                 return Vec3{max(a.x, Float(0.0f)), max(a.y, Float(0.0f)), max(a.z, Float(0.0f))};
             };
             linear.added = linear.added + positive(gloss);
-            const Layer &real = denoising.catchers;
+            const Float behind = Float(1.0f) / max(real_share, Float(1e-3f)); // means over what is behind objects
             const Float across = to_float(lane_numbers() + Int(x)) + Float(0.5f),
                         down(static_cast<float>(row) + 0.5f);
-            remove_covered(frame, positive(-gloss), load3(real.guides + albedo_guide, guide_at(real, x, row)), across,
-                           down, linear);
+            remove_covered(frame, positive(-gloss) * behind, matt * behind, across, down, linear);
         }
         linear.added = bounded_for_halves(linear.added);
         bool affected = false;

@@ -40,8 +40,8 @@ ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
     const Float x = pixel.x, y = pixel.y;
     const Float width(static_cast<float>(video.image.width)), height(static_cast<float>(video.image.height));
     const Bool inside = pixel.in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
-    if (!any(inside))
-        return {inside, black()};
+    if (!video.image.texels || !any(inside))
+        return {bool_of(false), black()};
     return {inside, sample_texture(frame.scene, video.image, x / width, y / height).colour};
 }
 
@@ -108,6 +108,8 @@ ARHOST_INLINE Remembered remembered_on_plane(const Surroundings &from, Vec3 posi
         const Float at = axis == 0 ? position.x : axis == 1 ? position.y : position.z;
         return (at - Float(from.low[i])) * Float(1 / from.texel_mm[i]);
     };
+    if (!from.knows_plane)
+        return {black(), Float(0.0f)};
     const Float x = texel(0), y = texel(1);
     const Bool inside = active & (x > Float(0.0f)) & (x < Float(static_cast<float>(Surroundings::width))) &
                         (y > Float(0.0f)) & (y < Float(static_cast<float>(Surroundings::plane_height)));
@@ -121,7 +123,11 @@ ARHOST_INLINE Filmed filmed_surface(const Frame &frame, const RTCHit16 &hit, con
     if (!frame.surroundings)
         return filmed;
     const Surroundings &surroundings = *frame.surroundings;
-    const Bool outside = active & ~filmed.inside & (object_number(frame.scene, hit) == Int(surroundings.catcher));
+    const int axis = surroundings.normal_axis();
+    const Vec3 n = s.geometric_normal;
+    const Float facing = (axis == 0 ? n.x : axis == 1 ? n.y : n.z) * Float(surroundings.side);
+    const Bool outside = active & ~filmed.inside & (facing > Float(0.0f)) &
+                         (object_number(frame.scene, hit) == Int(surroundings.catcher));
     if (!any(outside))
         return filmed;
     const Remembered remembered = remembered_on_plane(surroundings, s.position, outside);
@@ -140,16 +146,15 @@ ARHOST_INLINE void remember(const Frame &frame, std::int32_t row) {
     for (int x = 0; x < Surroundings::width; x += lanes) {
         const Float column = to_float(lane_numbers() + Int(x)) + Float(0.5f);
         Filmed filmed{bool_of(false), black()};
+        Bool is_lamp = bool_of(false);
         if (of_plane && surroundings.catcher >= 0) {
             Float position[3];
             position[surroundings.axes[0]] = Float(surroundings.low[0]) + column * Float(surroundings.texel_mm[0]);
             position[surroundings.axes[1]] =
                 Float(surroundings.low[1] + (static_cast<float>(row) + 0.5f) * surroundings.texel_mm[1]);
-            const int normal_axis = 3 - surroundings.axes[0] - surroundings.axes[1];
+            const int normal_axis = surroundings.normal_axis();
             position[normal_axis] = Float(surroundings.plane_mm);
-            // The side that faces the camera.
-            const Float side(frame.camera.eye[normal_axis] > surroundings.plane_mm ? 1.0f : -1.0f);
-            const auto component = [&](int axis) { return axis == normal_axis ? side : Float(0.0f); };
+            const auto component = [&](int axis) { return Float(axis == normal_axis ? surroundings.side : 0.0f); };
             filmed =
                 filmed_now(frame, {position[0], position[1], position[2]}, {component(0), component(1), component(2)},
                            Float(surroundings.texel_mm[0] * 1e-3f), bool_of(true));
@@ -158,7 +163,15 @@ ARHOST_INLINE void remember(const Frame &frame, std::int32_t row) {
             const float v = (static_cast<float>(row - Surroundings::plane_height) + 0.5f) / height;
             const Vec3 direction = equirectangular_direction(column * Float(1.0f / Surroundings::width), Float(v));
             filmed = filmed_towards(frame, direction);
-            filmed.inside = filmed.inside & (largest(filmed.light) < Float(saturated_video));
+            // A texel that contains a lamp is not remembered: the environment shows how bright it is.
+            for (int corner = 0; corner < 4 && any(filmed.inside); ++corner) {
+                const float beside = corner & 1 ? 0.3f : -0.3f, above = corner & 2 ? 0.3f : -0.3f;
+                const Vec3 towards = equirectangular_direction(
+                    (column + Float(beside)) * Float(1.0f / Surroundings::width), Float(v + above / height));
+                is_lamp = is_lamp | (largest(filmed_towards(frame, towards).light) >= Float(saturated_video));
+            }
+            is_lamp = filmed.inside & (is_lamp | (largest(filmed.light) >= Float(saturated_video)));
+            filmed.inside = filmed.inside & ~is_lamp;
             if (any(filmed.inside)) {
                 RTCRay16 ray;
                 set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(real_masks));
@@ -168,7 +181,7 @@ ARHOST_INLINE void remember(const Frame &frame, std::int32_t row) {
         const std::ptrdiff_t at = std::ptrdiff_t{Surroundings::width} * row + x;
         Vec3 light = black();
         Float certainty(0.0f);
-        if (surroundings.before[0]) {
+        if (surroundings.before[0] && (surroundings.knows_plane || !of_plane)) {
             light = {load(surroundings.before[0] + at), load(surroundings.before[1] + at),
                      load(surroundings.before[2] + at)};
             certainty = load(surroundings.before[Surroundings::certainty_row] + at);
@@ -177,6 +190,7 @@ ARHOST_INLINE void remember(const Frame &frame, std::int32_t row) {
         const Float share = select(certainty > Float(0.5f), Float(0.25f), Float(1.0f));
         light = select(filmed.inside, light + (filmed.light - light) * share, light);
         certainty = select(filmed.inside, Float(1.0f), certainty * Float(Surroundings::kept_per_frame));
+        certainty = select(is_lamp, Float(0.0f), certainty);
         store(surroundings.after[0] + at, light.x);
         store(surroundings.after[1] + at, light.y);
         store(surroundings.after[2] + at, light.z);

@@ -285,7 +285,8 @@ ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRay
         change = sampled_change(work, paths, s, form_factors, frame.light_samples, active, add_to_gloss);
     // Rays of the gloss do not see lamps behind mirrors and glass.
     const PhotonLight by_photons = photon_light(
-        work, paths, s, active, [&](Vec3 power, Vec3 to_light) __attribute__((always_inline)) {
+        work, paths, s, active & bool_of(shows(frame, View::caustics)),
+        [&](Vec3 power, Vec3 to_light) __attribute__((always_inline)) {
             PhotonLight light{power, black()};
             if (any_glossy)
                 light.mirrored =
@@ -353,7 +354,7 @@ ARHOST_INLINE Vec3 environment_towards(const Work &work, const Paths &paths, Vec
             seen = seen & ~blocked(frame.scene, ray, seen);
             light = select(seen, filmed.light, light);
         }
-        if (const Bool unseen = is_specular & ~seen; frame.surroundings && any(unseen)) {
+        if (const Bool unseen = is_specular & ~filmed.inside; frame.surroundings && any(unseen)) {
             const Remembered remembered = remembered_towards(*frame.surroundings, direction, unseen);
             light = light + (remembered.light - light) * remembered.certainty;
         }

@@ -21,15 +21,16 @@ constexpr Limits full_limits{.target_fps = 30, .min_scale = 0.5, .min_samples = 
 // shading.
 class Simulation {
 public:
-    explicit Simulation(const Limits &limits) : controller(limits) {}
+    // `unshaded`: the share of the time that does not depend on the number of shaded pixels.
+    explicit Simulation(const Limits &limits, double unshaded = 0.5) : controller(limits), unshaded_(unshaded) {}
 
     void run(std::chrono::seconds duration, double ms, double fixed_ms = 0, double noise = 0) {
         std::uniform_real_distribution<double> factor(1 - noise, 1 + noise);
         for (const auto end = now_ + duration; now_ < end;) {
             const Quality quality = controller.current();
             const double shaded = 1.0 / (quality.shading_px * quality.shading_px);
-            last_ms =
-                fixed_ms + ms * quality.scale * quality.scale * std::max(quality.samples, 1u) * (0.5 + 0.5 * shaded);
+            last_ms = fixed_ms + ms * quality.scale * quality.scale * std::max(quality.samples, 1u) *
+                                     (unshaded_ + (1 - unshaded_) * shaded);
             const auto time = std::chrono::duration_cast<std::chrono::nanoseconds>(
                 std::chrono::duration<double, std::milli>(last_ms * factor(random_)));
             now_ += std::max<std::chrono::nanoseconds>(time, 33ms); // the camera's rate
@@ -41,6 +42,7 @@ public:
     double last_ms = 0; // render time without noise
 
 private:
+    double unshaded_;
     QualityController::Clock::time_point now_{1h};
     std::minstd_rand random_{1};
 };
@@ -141,6 +143,18 @@ TEST(Quality, NeverOscillatesAtAConstantLoad) {
                     EXPECT_LE(simulation.controller.changes(), changes + 2)
                         << ms << " ms + " << fixed_ms << " ms, noise " << noise;
                 }
+}
+
+// Also if the shading takes much more, or less, of the time than predicted.
+TEST(Quality, NeverOscillatesWhateverTheShadingTakes) {
+    for (const double unshaded : {0.0, 0.1, 0.2, 0.8, 1.0})
+        for (double ms = 2; ms < 100; ms *= 1.05) {
+            Simulation simulation(with_shading, unshaded);
+            simulation.run(20s, ms);
+            const std::uint64_t changes = simulation.controller.changes();
+            simulation.run(600s, ms);
+            EXPECT_LE(simulation.controller.changes(), changes + 4) << ms << " ms, unshaded " << unshaded;
+        }
 }
 
 // The cost model predicts that the better level is affordable, but it is not.
