@@ -50,7 +50,7 @@ def compare(pictures, truths, views):
     error, flip, similar, owner, changed = [], [], [], [], []
     for picture, truth, (region, things) in zip(pictures, truths, views):
         error.append(np.abs(picture.astype(float) - truth))
-        flip.append(flip_evaluator.evaluate(truth / np.float32(255), picture / np.float32(255), "LDR")[0][..., 0])
+        flip.append(flip_evaluator.evaluate(truth / np.float32(255), picture / np.float32(255), "LDR", applyMagma=False)[0][..., 0])
         similar.append(structural_similarity(truth, picture, channel_axis=2, full=True)[1].mean(-1))
         owner.append(things)
         changed.append(region)
