@@ -53,7 +53,7 @@ std::size_t history_plane(const Layer &layer) {
 }
 std::size_t changes_of(const Layer &layer) {
     const std::int32_t lines = (layer.height + Layer::change_side - 1) / Layer::change_side;
-    return static_cast<std::size_t>(lines * layer.changes_per_row());
+    return static_cast<std::size_t>(lines) * static_cast<std::size_t>(layer.changes_per_row());
 }
 std::size_t guide_plane(const Layer &layer) {
     return static_cast<std::size_t>(layer.guide_stride()) * static_cast<std::size_t>(layer.height);

@@ -12,6 +12,7 @@ struct Header {
     std::uint32_t version;
     std::int32_t catcher, axes[2];
     float plane_mm, low[2], texel_mm[2], side;
+    bool operator==(const Header &) const = default;
 };
 constexpr std::uint32_t version = 1;
 constexpr std::size_t header_size = 64, plane_size = std::size_t{Surroundings::width} * Surroundings::height;
@@ -44,9 +45,12 @@ Surroundings surroundings_in(const StateSlots &slots, const EmbreeScene &scene, 
     }
     std::byte *const after = static_cast<std::byte *>(slots.after);
     const std::byte *before = static_cast<const std::byte *>(slots.before);
-    if (before && std::memcmp(before, &header.version, sizeof header.version) != 0)
+    Header earlier{};
+    if (before)
+        std::memcpy(&earlier, before, sizeof earlier);
+    if (earlier.version != version)
         before = nullptr;
-    surroundings.knows_plane = before && std::memcmp(before, &header, sizeof header) == 0;
+    surroundings.knows_plane = earlier == header;
     std::memset(after, 0, header_size);
     std::memcpy(after, &header, sizeof header);
     for (std::size_t i = 0; i < Surroundings::row_count; ++i) {
