@@ -158,8 +158,12 @@ TEST(Sessions, AReplayRepeatsTheReducedQualityOfALiveRun) {
     expect_same(run);
 }
 
-// Each image also depends on those before, but is never too late to be shown.
+// Each image also depends on those before. At this rate of the source, none is too late to be shown, and no output
+// drops one.
 TEST(Sessions, AReplayRepeatsTheReducedShadingOfALiveRun) {
+#if defined(__SANITIZE_ADDRESS__)
+    GTEST_SKIP() << "too slow under a sanitizer to show each image in time";
+#endif
     std::string yaml = recording("live", "0");
     yaml.replace(yaml.find(scenes), scenes.size() + std::string("optix-cs.yaml").size(), "path.yaml");
     ArhostRun run(yaml);
@@ -170,7 +174,7 @@ TEST(Sessions, AReplayRepeatsTheReducedShadingOfALiveRun) {
               "- {name: ball, sphere: {centre: [0, 0, 25], radius: 25}, material: red}\n");
     // No ray tracer reaches this frame rate.
     run.start({"--config", "run.yaml", "--set", "live.target_fps=10000", "--set", "live.min_scale=1", "--set",
-               "source.options.occlude_from=-1"});
+               "source.options.occlude_from=-1", "--set", "source.fps=10"});
     const auto is_reduced = [](const Json &line) {
         return line.value("overlay_shading_px", 1) == 2 && line["overlay"] != "none";
     };
