@@ -105,10 +105,12 @@ void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
     denoising_.catchers.holds = LayerLight::change;
     denoising_.gloss = make_layer(width, height, 1);
     denoising_.gloss.holds = LayerLight::gloss;
-    constexpr std::size_t planes = guide_rows + 2 * light_rows;
+    const auto planes_of = [](const Layer &layer) { // `gloss` has no guides of its own
+        return (layer.holds == LayerLight::gloss ? 0 : std::size_t{guide_rows}) + 2 * light_rows;
+    };
     std::size_t size = 0, changes = 0;
     for (const Layer *layer : layers()) {
-        size += planes * guide_plane(*layer);
+        size += planes_of(*layer) * guide_plane(*layer);
         changes += changes_of(*layer);
     }
     planes_.assign(size, 0);
@@ -119,13 +121,14 @@ void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
     for (Layer *layer : layers()) {
         layer->changes = std::exchange(next_changes, next_changes + changes_of(*layer));
         const auto take = [&] { return std::exchange(next, next + guide_plane(*layer)); };
-        std::ranges::generate(layer->guides, take);
+        if (layer->holds == LayerLight::gloss)
+            std::ranges::copy(denoising_.catchers.guides, layer->guides);
+        else
+            std::ranges::generate(layer->guides, take);
         for (auto &light : layer->light)
             std::ranges::generate(light, take);
     }
     denoising_.taps = taps_.data();
-    if (has_gloss_)
-        std::ranges::copy(denoising_.catchers.guides, denoising_.gloss.guides);
 }
 
 const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
@@ -187,9 +190,10 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     // Shadows and reflections of what has moved change the light of what has not. Where the change is smaller than
     // the noise, it is found in the frames that follow.
     constexpr std::uint32_t frames_to_find_change = 8;
-    header.frames_at_rest = moves && before ? 0
-                            : before        ? std::min(earlier.frames_at_rest + 1, frames_to_find_change)
-                                            : frames_to_find_change;
+    if (!before)
+        header.frames_at_rest = frames_to_find_change;
+    else if (!moves)
+        header.frames_at_rest = std::min(earlier.frames_at_rest + 1, frames_to_find_change);
     const bool is_coarse = shading_px > 1;
     const bool sharp_shadows_are_new =
         catcher_cell_px_ == 1 && (header.frames_at_rest == 0 || header.frames < frames_to_find_change);
@@ -198,7 +202,8 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     denoising_.objects.takes_turns = denoising_.object_phase >= 0;
     denoising_.catchers.takes_turns = denoising_.catcher_phase >= 0 && denoising_.catchers.cell_px == 1;
     denoising_.finds_change = header.frames_at_rest < frames_to_find_change;
-    std::ranges::fill(changes_, Change{});
+    if (denoising_.finds_change)
+        std::ranges::fill(changes_, Change{});
     std::memcpy(state, &header, sizeof header);
     return denoising_;
 }

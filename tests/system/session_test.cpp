@@ -139,6 +139,16 @@ TEST(Sessions, AReplayRepeatsTheDecisionsOfALiveRun) {
     expect_same(run);
 }
 
+// Stops a run that has recorded five such frames.
+template <class Predicate> void stop_after_five(ArhostRun &run, Predicate is_counted) {
+    EXPECT_TRUE(run.eventually([&] {
+        return run.exists("take/frames.jsonl") &&
+               std::ranges::count_if(lines_of(run, "take/frames.jsonl"), is_counted) >= 5;
+    })) << run.output();
+    send_signal(run.pid(), SIGTERM);
+    ASSERT_EQ(run.wait(), 130) << run.output();
+}
+
 TEST(Sessions, AReplayRepeatsTheReducedQualityOfALiveRun) {
 #if defined(__SANITIZE_ADDRESS__)
     GTEST_SKIP() << "takes minutes under a sanitizer";
@@ -148,12 +158,7 @@ TEST(Sessions, AReplayRepeatsTheReducedQualityOfALiveRun) {
     const auto is_reduced = [](const Json &line) {
         return line.value("overlay_samples", 32) < 32 && line["overlay"] != "none";
     };
-    EXPECT_TRUE(run.eventually([&] {
-        return run.exists("take/frames.jsonl") &&
-               std::ranges::count_if(lines_of(run, "take/frames.jsonl"), is_reduced) >= 5;
-    })) << run.output();
-    send_signal(run.pid(), SIGTERM);
-    ASSERT_EQ(run.wait(), 130) << run.output();
+    stop_after_five(run, is_reduced);
     ASSERT_EQ(run.run(replaying()), 0) << run.output();
     expect_same(run);
 }
@@ -178,12 +183,7 @@ TEST(Sessions, AReplayRepeatsTheReducedShadingOfALiveRun) {
     const auto is_reduced = [](const Json &line) {
         return line.value("overlay_shading_px", 1) == 2 && line["overlay"] != "none";
     };
-    EXPECT_TRUE(run.eventually([&] {
-        return run.exists("take/frames.jsonl") &&
-               std::ranges::count_if(lines_of(run, "take/frames.jsonl"), is_reduced) >= 5;
-    })) << run.output();
-    send_signal(run.pid(), SIGTERM);
-    ASSERT_EQ(run.wait(), 130) << run.output();
+    stop_after_five(run, is_reduced);
     ASSERT_EQ(run.run(replaying({"--allow", "path.yaml"})), 0) << run.output();
     expect_same(run);
 }

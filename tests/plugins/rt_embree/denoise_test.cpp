@@ -76,6 +76,13 @@ protected:
         EXPECT_EQ(tracer_.start(pinhole()), ARHOST_STATUS_OK) << tracer_.log();
     }
     LinearPicture next(double degrees) { return tracer_.render(turned(degrees), number_++); }
+    void expect_to_follow_the_camera() {
+        for (int i = 0; i < 11; ++i)
+            next(0.7 * i);
+        const LinearPicture truth = picture_of(still_life(), converged, turned(0.7 * 11));
+        const double noise = difference(picture_of(still_life(), noisy, turned(0.7 * 11)), truth);
+        EXPECT_LT(difference(next(0.7 * 11), truth), 0.25 * noise);
+    }
 
     LinearTracer tracer_;
     std::uint64_t number_ = 0;
@@ -125,11 +132,7 @@ TEST(DenoisingOfGloss, ConvergesWhileTheCameraRests) {
 }
 
 TEST_F(Denoising, FollowsTheCamera) {
-    for (int i = 0; i < 11; ++i)
-        next(0.7 * i);
-    const LinearPicture truth = picture_of(still_life(), converged, turned(0.7 * 11));
-    const double noise = difference(picture_of(still_life(), noisy, turned(0.7 * 11)), truth);
-    EXPECT_LT(difference(next(0.7 * 11), truth), 0.25 * noise);
+    expect_to_follow_the_camera();
 }
 
 // A tracer that takes four times as long as a frame of the video.
@@ -330,11 +333,7 @@ TEST_F(Denoising, ConvergesWithAQuarterOfTheShading) {
 
 TEST_F(Denoising, FollowsTheCameraWithAQuarterOfTheShading) {
     tracer_.shading_px = 2;
-    for (int i = 0; i < 11; ++i)
-        next(0.7 * i);
-    const LinearPicture truth = picture_of(still_life(), converged, turned(0.7 * 11));
-    const double noise = difference(picture_of(still_life(), noisy, turned(0.7 * 11)), truth);
-    EXPECT_LT(difference(next(0.7 * 11), truth), 0.25 * noise);
+    expect_to_follow_the_camera();
 }
 
 // Also those of objects that are thinner than two pixels: in the first image, each pixel has the light of its
