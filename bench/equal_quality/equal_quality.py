@@ -15,11 +15,7 @@ import peers  # noqa: E402
 
 PACKAGES = {"mitsuba": "3.9.1", "bpy": "5.0.1", "pyoidn": "2.5.1.0", "pyyaml": "6.0.3", "flip-evaluator": "1.7",
             "numpy": None, "pillow": None}
-if os.path.realpath(sys.prefix) != os.path.realpath(peers.venv):
-    peers.install_llvm()
-    peers.install(PACKAGES)
-    os.environ["DRJIT_LIBLLVM_PATH"] = peers.find_llvm()[1] or ""
-    os.execv(peers.venv_python, [peers.venv_python, *sys.argv])
+peers.enter(PACKAGES, needs_llvm=True)
 
 import flip_evaluator  # noqa: E402
 import numpy as np  # noqa: E402

@@ -15,11 +15,7 @@ sys.path.insert(0, os.path.join(root, "bench", "peers"))
 import peers  # noqa: E402
 
 PACKAGES = {"mitsuba": "3.9.1", "pillow": "13.0.0", "numpy": None}
-if os.path.realpath(sys.prefix) != os.path.realpath(peers.venv):
-    peers.install_llvm()
-    peers.install(PACKAGES)
-    os.environ["DRJIT_LIBLLVM_PATH"] = peers.find_llvm()[1] or ""
-    os.execv(peers.venv_python, [peers.venv_python, *sys.argv])
+peers.enter(PACKAGES, needs_llvm=True)
 
 import numpy as np  # noqa: E402
 from PIL import Image, ImageDraw  # noqa: E402

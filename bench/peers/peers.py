@@ -86,6 +86,18 @@ def install(wanted):
             print(f"  pip failed: {name} is skipped.")
 
 
+def enter(wanted, needs_llvm=False):
+    """Installs packages and restarts the script in build/peers-venv, unless it runs there. `needs_llvm`: for Mitsuba."""
+    if os.path.realpath(sys.prefix) == os.path.realpath(venv):
+        return
+    if needs_llvm:
+        install_llvm()
+    install(wanted)
+    if needs_llvm:
+        os.environ["DRJIT_LIBLLVM_PATH"] = find_llvm()[1] or ""
+    os.execv(venv_python, [venv_python, *sys.argv])
+
+
 class Renderer:
     """A renderer process that answers request lines (served.py, rt_embree_peers.cpp). Its stderr goes to a log."""
 

@@ -26,9 +26,7 @@ MOVING = "--moving" in sys.argv
 SAMPLES = (4 if QUICK else 16) if MOVING else 32 if QUICK else 256
 FOLDER = os.path.join(root, "build", "truth" + "-moving" * MOVING + "-quick" * QUICK)
 BIN = os.path.join(root, "build", "release", "bin")
-if os.path.realpath(sys.prefix) != os.path.realpath(peers.venv):
-    peers.install(PACKAGES)
-    os.execv(peers.venv_python, [peers.venv_python, *sys.argv])
+peers.enter(PACKAGES)
 
 import numpy as np  # noqa: E402
 from PIL import Image  # noqa: E402
