@@ -26,7 +26,7 @@ struct ObjectState {
     float world_from_object[12];
     std::uint32_t is_visible;
 };
-constexpr std::uint32_t state_version = 3;
+constexpr std::uint32_t state_version = 4;
 constexpr std::size_t alignment = 64; // of the rows, bytes
 // The history is of no use after so many missing frames in which objects have moved, for example because a marker was
 // lost. A slow ray tracer misses fewer frames.
@@ -59,10 +59,12 @@ std::size_t guide_plane(const Layer &layer) {
     return static_cast<std::size_t>(layer.guide_stride()) * static_cast<std::size_t>(layer.height);
 }
 std::size_t size_of(std::uint32_t width, std::uint32_t height, std::size_t objects, std::int32_t catcher_cell_px,
-                    bool has_gloss) {
+                    const DenoisedScene &scene) {
     const std::size_t fine = history_plane(make_layer(width, height, 1)),
                       of_catchers = history_plane(make_layer(width, height, catcher_cell_px));
-    return rows_offset(objects) + history_rows * sizeof(float) * (fine + of_catchers + (has_gloss ? fine : 0));
+    const std::size_t of_objects = scene.has_specular ? history_rows : seen_history;
+    const std::size_t values = of_objects * fine + seen_history * (of_catchers + (scene.has_gloss ? fine : 0));
+    return rows_offset(objects) + sizeof(float) * values;
 }
 
 // Writes to · inverse(from): the motion from one placement to another.
@@ -87,10 +89,10 @@ void write_motion(const float *from, const float *to, float *motion) {
 
 } // namespace
 
-Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows,
-                   bool has_gloss)
-    : objects_(objects), has_gloss_(has_gloss), catcher_cell_px_(has_sharp_shadows || has_gloss ? 1 : 2),
-      state_size_(size_of(width, height, objects, catcher_cell_px_, has_gloss)), motion_(12 * objects) {}
+Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, const DenoisedScene &scene)
+    : objects_(objects), has_gloss_(scene.has_gloss), has_specular_(scene.has_specular),
+      catcher_cell_px_(scene.has_sharp_shadows || scene.has_gloss ? 1 : 2),
+      state_size_(size_of(width, height, objects, catcher_cell_px_, scene)), motion_(12 * objects) {}
 
 std::vector<Layer *> Denoiser::layers() {
     std::vector<Layer *> layers{&denoising_.objects, &denoising_.catchers};
@@ -101,6 +103,7 @@ std::vector<Layer *> Denoiser::layers() {
 
 void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
     denoising_.objects = make_layer(width, height, 1);
+    denoising_.objects.keeps_seen = has_specular_;
     denoising_.catchers = make_layer(width, height, catcher_cell_px_);
     denoising_.catchers.holds = LayerLight::change;
     denoising_.gloss = make_layer(width, height, 1);
@@ -162,7 +165,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         header.first = earlier.first, header.frames = earlier.frames + 1;
     std::size_t next = rows_offset(objects_);
     for (Layer *layer : layers())
-        for (int i = 0; i < history_rows; ++i, next += sizeof(float) * history_plane(*layer)) {
+        for (int i = 0; i < layer->history_count(); ++i, next += sizeof(float) * history_plane(*layer)) {
             layer->after[i] = reinterpret_cast<float *>(state + next);
             layer->before[i] = before ? reinterpret_cast<const float *>(before + next) : nullptr;
         }

@@ -29,11 +29,16 @@ struct StateSlots {
     }
 };
 
+// Decides which planes the denoiser has.
+struct DenoisedScene {
+    bool has_sharp_shadows, has_gloss; // if neither, catchers have half the resolution
+    bool has_specular;                 // virtual mirrors or glass
+};
+
 class Denoiser {
 public:
-    // `width`, `height`: the largest size of an image. `has_sharp_shadows`, `has_gloss`: if neither, catchers have
-    // half the resolution.
-    Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, bool has_sharp_shadows, bool has_gloss);
+    // `width`, `height`: the largest size of an image.
+    Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, const DenoisedScene &scene);
 
     std::uint64_t state_size() const { return state_size_; } // bytes
 
@@ -56,7 +61,7 @@ private:
     std::vector<Layer *> layers();
 
     std::size_t objects_;
-    bool has_gloss_;
+    bool has_gloss_, has_specular_;
     std::int32_t catcher_cell_px_;
     std::uint64_t state_size_;
     std::vector<float> planes_;

@@ -259,7 +259,8 @@ constexpr std::int32_t unchanged_surface = most_surfaces - 4 + real_surface;
 enum GuideRow : int {
     position_guide,                    // three rows: mm, in world axes
     normal_guide = position_guide + 3, // three rows: unit vector
-    albedo_guide = normal_guide + 3,   // three rows: the factor of the denoised light
+    albedo_guide = normal_guide + 3,   // three rows: the factor of the denoised light; in mirrors and glass, a mean
+                                       // over frames of Scratch::seen
     surface_guide = albedo_guide + 3,  // an int's bits: number of the surface (surface_of() in guides.inl); 0: none;
                                        // unchanged_surface: the other guides and the light are not set
     guide_rows
@@ -278,7 +279,8 @@ enum HistoryRow : int {
     normal_history,                        // an int's bits: packed_normal()
     surface_history,                       // as surface_guide
     frames_history,                        // number of frames in the means
-    history_rows
+    seen_history,                          // three rows: albedo_guide of mirrors and glass
+    history_rows = seen_history + 3
 };
 
 // Sums over cells: the number of cells, and the difference between the luminance of the light in this frame and its
@@ -309,6 +311,8 @@ struct Layer {
     static constexpr std::int32_t change_side = 8;
     Change *changes; // of squares of change_side cells
     std::int32_t changes_per_row() const { return stride / change_side; }
+    bool keeps_seen; // in seen_history
+    int history_count() const { return keeps_seen ? history_rows : seen_history; }
     std::int32_t guide_stride() const { return stride + 2 * margin; }
     // Of the filter. Those of larger cells begin with wider steps.
     int filter_passes() const { return cell_px == 1 ? 5 : 4; }
@@ -336,6 +340,8 @@ struct Denoising {
     // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
     // axes. NULL if no placement has changed.
     const float *before_from_now;
+    // Whether what curved mirrors and glass show may move over them.
+    bool seen_moves() const { return camera_moved || before_from_now; }
 };
 
 // The content of an image: values of the option `show`, in the order of plugin.cpp.
@@ -410,6 +416,9 @@ struct Scratch {
     // Results of the current sample, per colour channel: plane_count planes of tile_pixels each.
     float *radiance[3];
     float *sum[sum_rows]; // sums over all samples
+    // Of mirrors and glass, three rows, sums over all samples: the light that they show of lamps, the environment and
+    // the video, and the albedo of the virtual objects that they show. It has little noise.
+    float *seen[3];
     float *guide[guide_rows];
     DeferredPixels catchers, objects; // to be sampled
     Windows virtual_windows;          // of virtual objects; unknown if there are occluders

@@ -72,8 +72,8 @@ Rectangle united(const Rectangle &a, const Rectangle &b) {
     return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
 }
 
-// Whether objects show the video around them.
-bool shows_video(const EmbreeScene &scene) {
+// Whether there are virtual mirrors or glass objects.
+bool has_specular(const EmbreeScene &scene) {
     return std::ranges::any_of(std::span(scene.view().objects, scene.placed_objects().size()),
                                [](const Object &object) {
                                    const arhost_material_model model = object.material->model;
@@ -105,7 +105,7 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     // scatter two. All other queues hold fewer than three packets (trace_queued_rays() in scatter.inl). Whole packets
     // are read even from partly filled queues, so each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
-    constexpr int pixel_rows = plane_count * 3 + sum_rows + guide_rows;
+    constexpr int pixel_rows = plane_count * 3 + sum_rows + 3 + guide_rows;
     constexpr std::int32_t caught_capacity = tile_pixels / 4 + packet, deferred_capacity = tile_pixels + packet;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
                     std::size_t{DeferredPixels::rows} * (caught_capacity + deferred_capacity) +
@@ -115,6 +115,8 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     for (float *&row : scratch_.radiance)
         row = take(plane_count * tile_pixels);
     for (float *&row : scratch_.sum)
+        row = take(tile_pixels);
+    for (float *&row : scratch_.seen)
         row = take(tile_pixels);
     for (float *&row : scratch_.guide)
         row = take(tile_pixels);
@@ -152,8 +154,10 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     }
     if (settings.denoise && lights_ && setup.scene->objects.count <= Denoising::most_objects)
         denoiser_.emplace(full_intrinsics_.width, full_intrinsics_.height, setup.scene->objects.count,
-                          lights_->casts_sharp_shadows(), scene_.view().has_gloss);
-    remembers_ = denoiser_ && setup.video_format && shows_video(scene_);
+                          DenoisedScene{.has_sharp_shadows = lights_->casts_sharp_shadows(),
+                                        .has_gloss = scene_.view().has_gloss,
+                                        .has_specular = has_specular(scene_)});
+    remembers_ = denoiser_ && setup.video_format && has_specular(scene_);
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
     if (settings.accumulate)

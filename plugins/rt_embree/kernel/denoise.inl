@@ -189,18 +189,22 @@ ARHOST_INLINE void write_for_denoiser(const Frame &frame, const Scratch &scratch
     write_cells(layer, cells, layer.guides[surface_guide], scratch.guide[surface_guide] + first_pixel);
     if (!any(surface != Int(denoising.flat_surface)))
         return;
-    for (int i = 0; i < surface_guide; ++i)
+    for (int i = 0; i < albedo_guide; ++i)
         write_cells(layer, cells, layer.guides[i], scratch.guide[i] + first_pixel);
     alignas(64) float values[lanes];
-    const Bool is_virtual = has_light_in(layer, surface);
+    const Bool is_virtual = has_light_in(layer, surface), is_specular = is_kind(surface, specular_surface);
     const Float samples = load(scratch.sum[coverage_row] + first_pixel); // more at edges in mirrors
     for (int i = 0; i < 3; ++i) {
-        const Float light = load(scratch.sum[light_row + i] + first_pixel) / (guide(albedo_guide + i) * samples);
+        const Float seen = max(load(scratch.seen[i] + first_pixel) / samples, Float(least_divisor));
+        const Float albedo = select(is_specular, seen, guide(albedo_guide + i));
+        store(values, albedo);
+        write_cells(layer, cells, layer.guides[albedo_guide + i], values);
+        const Float light = load(scratch.sum[light_row + i] + first_pixel) / (albedo * samples);
         store(values, select(is_virtual, light, Float(0.0f)));
         write_cells(layer, cells, layer.light[0][i], values);
     }
     const int phase = denoising.object_phase;
-    const Bool in_turn = is_kind(surface, specular_surface) | (phase_of_lanes() == Int(phase)) | bool_of(phase < 0);
+    const Bool in_turn = is_specular | (phase_of_lanes() == Int(phase)) | bool_of(phase < 0);
     const Bool is_sampled = objects_in_turn(frame, scratch, first_pixel);
     store(values, select(in_turn, Float(sampled), select(is_sampled, Float(sampled_early), Float(not_sampled))));
     write_cells(layer, cells, layer.light[0][variance_light], values);
@@ -226,14 +230,14 @@ ARHOST_INLINE Projected projected(const Frame &frame, const Camera &camera, Vec3
 
 // The means of earlier frames at surfaces.
 struct Past {
-    Vec3 light;
+    Vec3 light, seen;         // seen: see seen_history
     Float moments[2], frames; // frames: 0 if the surface is new
 };
 // `x`, `row`: of the first cell.
 ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int row, Vec3 position, Vec3 normal,
                            Int surface, Bool active) {
     const Denoising &denoising = *frame.denoising;
-    Past past{black(), {Float(0.0f), Float(0.0f)}, Float(0.0f)};
+    Past past{black(), black(), {Float(0.0f), Float(0.0f)}, Float(0.0f)};
     if (!layer.before[0])
         return past;
     // The point may be in any pixel of its cell. The cell moves as that point does.
@@ -261,6 +265,7 @@ ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int ro
                 top = floor(max(min(at.y + Float(1.0f / 64), Float(1e6f)), Float(-2.0f)));
     const Float along = max(at.x - left, Float(0.0f)), down = max(at.y - top, Float(0.0f));
     Float total(0.0f);
+    const bool any_specular = layer.keeps_seen && any(active & is_kind(surface, specular_surface));
     for (int i = 0; i < 4; ++i) {
         const Int column = to_int(left) + Int(i & 1), line = to_int(top) + Int(i >> 1);
         const Float weight = (i & 1 ? along : Float(1.0f) - along) * (i >> 1 ? down : Float(1.0f) - down);
@@ -283,9 +288,15 @@ ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int ro
         add(past.moments[1], moment_history + 1);
         add(past.frames, frames_history);
         total = total + share;
+        if (!any_specular)
+            continue;
+        add(past.seen.x, seen_history);
+        add(past.seen.y, seen_history + 1);
+        add(past.seen.z, seen_history + 2);
     }
     const Float scale = select(total > Float(0.0f), Float(1.0f) / max(total, Float(1e-6f)), Float(0.0f));
     past.light = past.light * scale;
+    past.seen = past.seen * scale;
     for (Float &moment : past.moments)
         moment = moment * scale;
     past.frames = past.frames * scale;
@@ -331,6 +342,8 @@ ARHOST_INLINE void find_change(const Frame &frame, const Layer &layer, std::int3
         const Past past = past_of(frame, layer, x, row, load3(layer.guides + position_guide, at),
                                   load3(layer.guides + normal_guide, at), surface, active);
         store3(layer.after, kept, past.light);
+        if (layer.keeps_seen)
+            store3(layer.after + seen_history, kept, past.seen);
         store(layer.after[moment_history] + kept, past.moments[0]);
         store(layer.after[moment_history + 1] + kept, past.moments[1]);
         store(layer.after[frames_history] + kept, past.frames);
@@ -402,8 +415,8 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         const Int surface = surfaces_at(layer, at);
         const Bool active = has_light_in(layer, surface);
         if (!any(active)) {
-            for (float *to : layer.after)
-                store(to + kept, Float(0.0f));
+            for (int i = 0; i < layer.history_count(); ++i)
+                store(layer.after[i] + kept, Float(0.0f));
             continue;
         }
         const float *const *guides = layer.guides;
@@ -412,6 +425,7 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         Past past;
         if (denoising.finds_change)
             past = {load3(layer.after, kept),
+                    layer.keeps_seen ? load3(layer.after + seen_history, kept) : black(),
                     {load(layer.after[moment_history] + kept), load(layer.after[moment_history + 1] + kept)},
                     load(layer.after[frames_history] + kept)};
         else
@@ -447,6 +461,13 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         variance = select(frames < Float(8.0f), select(shows_surroundings, Float(0.0f), Float(unknown)), variance);
         variance = select(frames > Float(0.0f), variance, Float(no_light));
         store3(layer.after, kept, select(active, mean, black()));
+        if (layer.keeps_seen) {
+            Vec3 seen = load3(guides + albedo_guide, at);
+            if (!denoising.seen_moves())
+                seen = select(is_kind(surface, specular_surface), past.seen + (seen - past.seen) * share, seen);
+            store3(layer.guides + albedo_guide, at, seen);
+            store3(layer.after + seen_history, kept, select(active, seen, black()));
+        }
         store(layer.after[moment_history] + kept, select(active, first, Float(0.0f)));
         store(layer.after[moment_history + 1] + kept, select(active, second, Float(0.0f)));
         store(layer.after[distance_history] + kept,
@@ -514,8 +535,8 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
         const Float inverse_tolerance =
             Float(1.0f) / (distance * Float(2.0f * static_cast<float>(step * layer.cell_px) * denoising.pixel_angle) +
                            Float(1e-6f));
-        // Guides do not have all edges of the picture in curved mirrors and glass.
-        const Float tolerated = select(is_kind(surface, specular_surface), Float(9.0f), Float(36.0f));
+        // Guides do not have all edges of shadows in mirrors and glass.
+        const Float tolerated = select(is_kind(surface, specular_surface), Float(16.0f), Float(36.0f));
         const Float own_weight = select(has_light, Float(0.25f), Float(0.0f)), least = max(variance, Float(0.0f));
         Vec3 sum = light * own_weight;
         Float total = own_weight, squares = least * own_weight * own_weight;

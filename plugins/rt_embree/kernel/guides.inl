@@ -14,7 +14,8 @@ ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool activ
         SurfaceKind kind = scattering_surface;
         if (object.role != ARHOST_ROLE_VIRTUAL)
             kind = real_surface;
-        else if (model == ARHOST_MATERIAL_METAL || model == ARHOST_MATERIAL_METALLIC_ROUGHNESS)
+        else if (model == ARHOST_MATERIAL_METAL || model == ARHOST_MATERIAL_METALLIC_ROUGHNESS ||
+                 (model == ARHOST_MATERIAL_GLASS && object.material->roughness > 0))
             kind = glossy_surface;
         else if (model == ARHOST_MATERIAL_MIRROR || model == ARHOST_MATERIAL_GLASS)
             kind = specular_surface;
@@ -43,23 +44,24 @@ ARHOST_INLINE void put_guides(const Work &work, int first_pixel, const Guides &g
     }
 }
 
+constexpr float least_divisor = 1.0f / 64; // of the light of virtual objects
+
 // The denoiser divides the light of a surface by its albedo, so that textures stay sharp.
 ARHOST_INLINE Vec3 divisor_of(const Surface &s) {
     const Vec3 gloss = select(s.is_rough, s.specular, black());
     const Bool divides = s.is_lit & ~(largest(s.emission) > Float(0.0f));
     const auto of = [&](Float a, Float b) __attribute__((always_inline)) {
-        return select(divides, max(a + b, Float(1.0f / 64)), Float(1.0f));
+        return select(divides, max(a + b, Float(least_divisor)), Float(1.0f));
     };
     return {of(s.diffuse.x, gloss.x), of(s.diffuse.y, gloss.y), of(s.diffuse.z, gloss.z)};
 }
 
 // Traces rays through mirrors and glass, at each vertex along the branch with the larger throughput, to the first
-// surface of another kind. Replaces the guides of these pixels: the normal of that surface, its albedo times the
-// throughput, and the position of its virtual image.
+// surface of another kind. Replaces the guides of these pixels: the normal of that surface, and the position of its
+// virtual image.
 ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction, int first_pixel, Bool specular) {
     const Frame &frame = work.frame;
     const Scene &scene = frame.scene;
-    Vec3 throughput = white();
     Float travelled(0.0f);
     Vec3 towards = direction;
     constexpr int most_bounces = 8;
@@ -72,33 +74,22 @@ ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction
             const arhost_material &material = *object.material;
             const Vec3 above = s.position + s.geometric_normal * s.offset;
             if (material.model == ARHOST_MATERIAL_MIRROR) {
-                throughput = select(here, throughput * splat(material.reflectivity), throughput);
                 origin = select(here, above, origin);
                 next = select(here, reflected(s, towards), next);
                 arrived = arrived & ~here;
             } else if (material.model == ARHOST_MATERIAL_GLASS) {
                 const GlassScatter glass = scatter_at_glass(s, towards, material, {Float(0.0f), Float(0.0f)}, here);
                 const Bool reflects = here & (glass.reflectance > Float(0.5f));
-                const Vec3 share = select(reflects, splat(material.reflectivity) * glass.reflectance,
-                                          splat(material.refraction) * (Float(1.0f) - glass.reflectance));
-                throughput = select(here, throughput * glass.transmittance * share, throughput);
                 origin = select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), origin);
                 next = select(here, select(reflects, glass.reflected, glass.refracted), next);
                 arrived = arrived & ~here;
             }
         });
         if (any(arrived)) {
-            const Filmed filmed = filmed_surface(frame, rays.hit, s, arrived & s.is_real);
-            const Vec3 albedo = select(filmed.inside, filmed.light, divisor_of(s)) * throughput;
-            const auto least = [](Float a) __attribute__((always_inline)) {
-                return max(a, Float(1.0f / 64));
-            };
             const Int mirror = bits_of(load(work.scratch.guide[surface_guide] + first_pixel));
             const Int seen = object_number(scene, rays.hit) & Int(1023);
             put_guides(work, first_pixel,
-                       {splat(frame.camera.eye) + direction * travelled,
-                        s.normal,
-                        {least(albedo.x), least(albedo.y), least(albedo.z)},
+                       {splat(frame.camera.eye) + direction * travelled, s.normal, white(),
                         mirror + (seen + Int(1)) * Int(mirrored_unit)},
                        arrived);
         }

@@ -237,9 +237,12 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     }
     for (int i = 0; i < frame.scene.sum_row_count(); ++i)
         __builtin_memset(scratch.sum[i], 0, tile_pixels * sizeof(float));
-    if (frame.denoising)
-        for (float *guide : scratch.guide)
-            __builtin_memset(guide, 0, tile_pixels * sizeof(float));
+    if (frame.denoising) {
+        for (float *row : scratch.guide)
+            __builtin_memset(row, 0, tile_pixels * sizeof(float));
+        for (float *row : scratch.seen)
+            __builtin_memset(row, 0, tile_pixels * sizeof(float));
+    }
 
     for (std::int32_t i = 0; i < frame.sample_count; ++i) {
         work.index = static_cast<std::uint32_t>(i);

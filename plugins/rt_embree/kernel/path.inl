@@ -12,37 +12,38 @@
 // Paths of fewer bounces are not ended at random.
 constexpr std::uint32_t first_roulette_depth = 2;
 
-// Ends paths at random, so that those that go on have about the same throughput.
-ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughput, Bool active) {
+// Returns the paths from the eye that only mirrors and glass have scattered.
+ARHOST_INLINE Bool is_seen(const Paths &paths) {
+    return (paths.inverse_density == Float(0.0f)) & ~changes_catcher(paths);
+}
+
+// Ends paths at random, so that those that go on have about the same throughput, 1 / importance.
+ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughput, Float importance, Bool active) {
     active = active & (largest(throughput) > Float(0.0f));
     if (paths.depth < first_roulette_depth || !any(active))
         return active;
-    const Float chance = min(max(largest(throughput), Float(0.05f)), Float(1.0f));
+    const Float chance = min(max(largest(throughput) * importance, Float(0.05f)), Float(1.0f));
     throughput = throughput * (Float(1.0f) / chance);
     return active & (path_pair(work, paths, roulette_dimension).u < chance);
 }
 
-// Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
+// Light that is seen through glass should have no noise (Scratch::seen).
+constexpr float importance_of_seen = 16;
+
+// Queues a reflected and a refracted ray.
 ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
-                                         const arhost_material &material, Float choice, Bool active) {
+                                         const arhost_material &material, Bool active) {
     const Pair uv = material.roughness > 0 ? path_pair(work, paths, facet_dimension) : Pair{};
     const GlassScatter glass = scatter_at_glass(s, direction, material, uv, active);
     const Vec3 arriving = paths.throughput * glass.transmittance;
-    Vec3 by_reflection = arriving * splat(material.reflectivity) * glass.unmasked_reflected,
-         by_refraction = arriving * splat(material.refraction) * glass.unmasked_refracted;
-    Bool reflects = active & (choice < glass.reflectance), refracts = active & ~reflects;
-    if (paths.depth == 0) {
-        by_reflection = by_reflection * glass.reflectance;
-        by_refraction = by_refraction * (Float(1.0f) - glass.reflectance);
-        reflects = active;
-        refracts = active & (glass.reflectance < Float(1.0f));
-    }
-    reflects = survive(work, paths, by_reflection, reflects);
-    if (any(reflects))
-        enqueue(work, paths, s.position + s.geometric_normal * s.offset, glass.reflected, by_reflection, reflects);
-    refracts = survive(work, paths, by_refraction, refracts);
-    if (any(refracts))
-        enqueue(work, paths, s.position - s.geometric_normal * s.offset, glass.refracted, by_refraction, refracts);
+    Vec3 by_reflection = arriving * splat(material.reflectivity) * (glass.unmasked_reflected * glass.reflectance),
+         by_refraction =
+             arriving * splat(material.refraction) * (glass.unmasked_refracted * (Float(1.0f) - glass.reflectance));
+    const Float importance = select(is_seen(paths), Float(importance_of_seen), Float(1.0f));
+    if (const Bool goes_on = survive(work, paths, by_reflection, importance, active); any(goes_on))
+        enqueue(work, paths, s.position + s.geometric_normal * s.offset, glass.reflected, by_reflection, goes_on);
+    if (const Bool goes_on = survive(work, paths, by_refraction, importance, active); any(goes_on))
+        enqueue(work, paths, s.position - s.geometric_normal * s.offset, glass.refracted, by_refraction, goes_on);
 }
 
 // Queues one ray for each lane, scattered by the surface.
@@ -56,7 +57,7 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
     for_each_object(work.frame.scene, rays.hit, active, [&](const Object &object, Bool here) {
         const arhost_material &material = *object.material;
         if (material.model == ARHOST_MATERIAL_GLASS) {
-            scatter_path_in_glass(work, paths, s, direction, material, choice.v, here);
+            scatter_path_in_glass(work, paths, s, direction, material, here);
             opaque = opaque & ~here;
         } else if (material.model == ARHOST_MATERIAL_MIRROR) {
             mirror_reflectance = select(here, splat(material.reflectivity), mirror_reflectance);
@@ -71,7 +72,7 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
         return;
     const Bool mirrors = opaque & (choice.v < mirror_chance);
     Vec3 by_mirror = paths.throughput * mirror_reflectance * (Float(1.0f) / max(mirror_chance, Float(1e-6f)));
-    if (const Bool goes_on = survive(work, paths, by_mirror, mirrors); any(goes_on))
+    if (const Bool goes_on = survive(work, paths, by_mirror, Float(1.0f), mirrors); any(goes_on))
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), by_mirror, goes_on);
     Bool scatters = opaque & ~mirrors & s.is_lit;
     if (!any(scatters))
@@ -89,10 +90,32 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
                       (Float(0.318309886f) / max(density * (Float(1.0f) - mirror_chance), Float(1e-20f)));
     scatters =
         scatters & (cosine > Float(0.0f)) & (dot(out, s.geometric_normal) > Float(0.0f)) & (density > Float(0.0f));
-    scatters = survive(work, paths, throughput, scatters);
+    scatters = survive(work, paths, throughput, Float(1.0f), scatters);
     if (any(scatters))
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, out, throughput, scatters,
                 Float(1.0f) / max(density, Float(1e-30f)));
+}
+
+// Adds to Scratch::seen of paths behind mirrors and glass.
+ARHOST_INLINE void add_seen(Work &work, const Paths &paths, Vec3 light, Bool active) {
+    if (!work.frame.denoising || paths.depth == 0)
+        return;
+    active = active & is_seen(paths);
+    if (!any(active))
+        return;
+    const Vec3 arriving = paths.throughput * light;
+    const Float bound(work.frame.path.max_radiance);
+    alignas(64) float values[3][lanes];
+    alignas(64) int pixel[lanes];
+    store(values[0], min(arriving.x, bound));
+    store(values[1], min(arriving.y, bound));
+    store(values[2], min(arriving.z, bound));
+    store(pixel, paths.pixel);
+    for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
+        const int lane = __builtin_ctz(remaining);
+        for (int i = 0; i < 3; ++i)
+            work.scratch.seen[i][pixel[lane]] += values[i][lane];
+    }
 }
 
 // The denoiser leaves bright single paths visible for many frames. So surfaces have wider highlights where another
@@ -112,8 +135,11 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
     if (paths.depth > 0)
         active = active & ~(s.is_real & sees_only_virtual(paths));
     paths.pixel = paths.pixel & Int(filmed_bit - 1);
-    if (paths.depth > 0 && any(active & s.is_real))
-        active = active & ~add_filmed(work, rays.hit, s, paths, active & s.is_real);
+    if (paths.depth > 0 && any(active & s.is_real)) {
+        const FilmedLight filmed = add_filmed(work, rays.hit, s, paths, active & s.is_real);
+        add_seen(work, paths, filmed.light, filmed.added);
+        active = active & ~filmed.added;
+    }
     if (!any(active))
         return;
     if (paths.depth == 1)
@@ -129,6 +155,7 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
                                                         inverse_density);
         add_radiance(work, paths, emission, emits);
     }
+    add_seen(work, paths, select(emits, s.emission, divisor_of(s)), active & (emits | s.is_lit));
     const bool scatters = paths.depth < scene.max_depth;
     const Bool lit = active & s.is_lit;
     if (any(lit)) {
@@ -153,13 +180,18 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
     const Bool hit = trace(scene, scene.root, make_query(Coherence::incoherent), rays, next.active);
     const Bool sees_all = next.active & ~sees_only_virtual(next.paths);
     const Bool missed = sees_all & ~hit;
-    if (any(missed))
-        add_radiance(work, next.paths, environment_towards(work, next.paths, next.direction, missed), missed);
+    if (any(missed)) {
+        const Vec3 light = environment_towards(work, next.paths, next.direction, missed);
+        add_radiance(work, next.paths, light, missed);
+        add_seen(work, next.paths, light, missed);
+    }
     if (scene.has_area_lights) {
         const Vec3 light = lamps_towards(work, next.paths, next.origin, next.direction, load(rays.ray.tfar));
         const Bool lit = sees_all & (largest(light) > Float(0.0f));
-        if (any(lit))
+        if (any(lit)) {
             add_radiance(work, next.paths, light, lit);
+            add_seen(work, next.paths, light, lit);
+        }
     }
     if (any(hit))
         shade_path(work, rays, hit, next.paths);
@@ -311,8 +343,12 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Dir
         const Bool specular =
             rest & is_kind(bits_of(load(work.scratch.guide[surface_guide] + first_pixel)), specular_surface);
         rest = rest & ~specular;
-        if (any(specular))
-            shade_specular(work, hits, paths, direction_at, specular);
+        if (any(specular)) {
+            if (work.frame.denoising->seen_moves()) // there is no mean over frames
+                shade_path(work, hits.rays, specular, paths);
+            else
+                shade_specular(work, hits, paths, direction_at, specular);
+        }
         if (work.frame.denoising->object_phase >= 0) {
             defer(work.scratch.objects, direction, paths.pixel,
                   rest & objects_in_turn(work.frame, work.scratch, first_pixel));

@@ -313,14 +313,19 @@ ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRay
         enqueue_bounce(work, relative, s, form_factors, relative.throughput, 1, active);
 }
 
-// Adds the light of real surfaces that the video shows, as virtual objects change it. Returns the lanes whose light
-// it has added.
-ARHOST_INLINE Bool add_filmed(Work &work, const RTCHit16 &hit, const Surface &s, const Paths &paths, Bool active) {
+struct FilmedLight {
+    Vec3 light; // of the video
+    Bool added;
+};
+
+// Adds the light of real surfaces that the video shows, as virtual objects change it.
+ARHOST_INLINE FilmedLight add_filmed(Work &work, const RTCHit16 &hit, const Surface &s, const Paths &paths,
+                                     Bool active) {
     const Frame &frame = work.frame;
     const Filmed filmed = filmed_surface(frame, hit, s, active);
     active = filmed.inside;
     if (!any(active))
-        return active;
+        return {filmed.light, active};
     const Vec3 relative = relative_change(frame, s, irradiance_without_objects(frame, s));
     const Float form_factors = form_factors_of(frame.path, s);
     // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
@@ -336,7 +341,7 @@ ARHOST_INLINE Bool add_filmed(Work &work, const RTCHit16 &hit, const Surface &s,
     const Vec3 albedo{min(reflectance.x, Float(1.0f)), min(reflectance.y, Float(1.0f)),
                       min(reflectance.z, Float(1.0f))};
     enqueue_bounce(work, paths, s, form_factors, paths.throughput * albedo, sample_ratio, active);
-    return active;
+    return {filmed.light, active};
 }
 
 // Returns the light that rays receive that hit no surface: the environment or the background. Rays that only mirrors

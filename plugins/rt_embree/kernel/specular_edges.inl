@@ -5,11 +5,11 @@
 #pragma once
 #include "denoise.inl"
 
-// The surfaces and the light of the pixels of a tile, with a margin of one pixel.
+// The surfaces and the light that the pixels of a tile show, with a margin of one pixel.
 struct TileSurfaces {
     static constexpr int stride = tile_side + 2;
     int surface[stride * stride];
-    float light[stride * stride]; // luminance
+    float seen[stride * stride]; // luminance of Scratch::seen
     static constexpr int at(int x, int y) { return (y + 1) * stride + x + 1; }
 };
 
@@ -22,9 +22,8 @@ inline bool shows_specular_edge(const TileSurfaces &tile, int x, int y) {
         const int differs = tile.surface[there] ^ surface;
         if ((differs & (mirrored_unit - 1)) != 0)
             continue; // the edge of the mirror itself
-        const float light = tile.light[at], other = tile.light[there];
-        const bool shows_surroundings = surface < mirrored_unit;
-        if (differs != 0 || (shows_surroundings && __builtin_fabsf(light - other) > 0.1f * (light + other) + 0.02f))
+        const float light = tile.seen[at], other = tile.seen[there];
+        if (differs != 0 || __builtin_fabsf(light - other) > 0.25f * (light + other) + 0.02f)
             return true;
     }
     return false;
@@ -45,17 +44,17 @@ ARHOST_INLINE void smooth_specular_edges(Work &work, const Tile &tile) {
     TileSurfaces surfaces{};
     for_each_block(all, [&](int number, int x0, int y0, int width, int height) {
         alignas(64) int surface[lanes];
-        alignas(64) float light[lanes];
+        alignas(64) float seen[lanes];
         const auto sum = [&](int row) __attribute__((always_inline)) {
-            return load(scratch.sum[light_row + row] + number * lanes);
+            return load(scratch.seen[row] + number * lanes);
         };
         store(surface, bits_of(load(scratch.guide[surface_guide] + number * lanes)));
-        store(light, luminance({sum(0), sum(1), sum(2)}) * Float(1.0f / static_cast<float>(frame.sample_count)));
+        store(seen, luminance({sum(0), sum(1), sum(2)}) * Float(1.0f / static_cast<float>(frame.sample_count)));
         for (int row = 0; row < height; ++row)
             for (int column = 0; column < width; ++column) {
                 const int to = TileSurfaces::at(x0 - all.x0 + column, y0 - all.y0 + row);
                 surfaces.surface[to] = surface[block * row + column];
-                surfaces.light[to] = light[block * row + column];
+                surfaces.seen[to] = seen[block * row + column];
             }
     });
     std::uint16_t edges[tile_pixels / lanes];

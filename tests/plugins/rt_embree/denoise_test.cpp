@@ -107,9 +107,10 @@ TEST(DenoisingOfMirrors, ConvergesWhileTheCameraRests) {
     };
     const double noise = difference(picture_of(with_mirror_and_glass(), noisy, turned(0)), truth, shows_them);
     LinearPicture picture = tracer.render(turned(0), 0);
+    EXPECT_LT(difference(picture, truth, shows_them), 0.7 * noise);
     for (std::uint64_t i = 1; i < 16; ++i)
         picture = tracer.render(turned(0), i);
-    EXPECT_LT(difference(picture, truth, shows_them), 0.4 * noise);
+    EXPECT_LT(difference(picture, truth, shows_them), 0.3 * noise);
 }
 
 // The table mirrors the objects, and not what they cover.
@@ -271,10 +272,13 @@ TEST(Surroundings, StayVisibleInMirrors) {
     const arhost_camera far = camera({0, -400, 400}, {0, -100, 0}, {0, 0, 1}),
                         near = camera({0, -60, 60}, {0, 100, 50}, {0, 0, 1});
     const Video video(far.intrinsics, code);
-    const auto mirrored =
-        [](const LinearPicture &picture) { // the table behind the near camera, 180 mm from the mirror
-            return double{picture.value(width / 2, height / 2 + 11, 1)};
-        };
+    // Of the table behind the near camera, 180 mm from the mirror.
+    const auto mirrored = [](const LinearPicture &picture) {
+        double sum = 0;
+        for (std::uint32_t x = width / 2 - 5; x < width / 2 + 5; ++x)
+            sum += double{picture.value(x, height / 2 + 11, 1)};
+        return sum / 10;
+    };
     LinearTracer tracer(make(), denoised, "rt_embree");
     ASSERT_EQ(tracer.start(far.intrinsics, &video), ARHOST_STATUS_OK) << tracer.log();
     EXPECT_NEAR(mirrored(tracer.render(near, 0, &video)), of_table, 0.02);
