@@ -382,11 +382,12 @@ class _RaytracerAdapter(_Adapter):
         self.form = form
         return STATUS_OK, self._state_size(2**63 - 1)
 
-    def render(self, max_samples, sequence, time_s, camera, moved, deformed, video, state_before, state_after, pixels,
-               height, width, stride):
+    def render(self, max_samples, shading_px, sequence, time_s, camera, moved, deformed, video, state_before,
+               state_after, pixels, height, width, stride):
         def render():
             request = Fields(
-                max_samples=max_samples, full_samples=0, sequence=sequence, time_s=time_s,
+                max_samples=max_samples, full_samples=0, shading_px=shading_px, coarsest_shading_px=0,
+                sequence=sequence, time_s=time_s,
                 camera=Fields(_record(camera, CAMERA)),
                 moved=np.ndarray(len(moved) // MOVED_OBJECT.itemsize, MOVED_OBJECT, moved),
                 deformed=[Fields(object=index, is_visible=bool(is_visible), positions=_vectors(positions),
@@ -396,9 +397,10 @@ class _RaytracerAdapter(_Adapter):
                 state_before=_state(state_before), state_after=_state(state_after))
             region = self.plugin.render(request, np.ndarray((height, width, 8), np.float16, pixels, 0, (stride, 16, 2))
                                         if self.form == IMAGE_FORM_LINEAR else _pixels(pixels, height, width, 4, stride))
-            if not 0 <= request.full_samples < 1 << 32:
-                raise ValueError(f"full_samples is {request.full_samples}; it must be 0 to 4294967295")
-            return STATUS_OK, (int(request.full_samples),
+            for name in ("full_samples", "coarsest_shading_px"):
+                if not 0 <= (value := getattr(request, name)) < 1 << 32:
+                    raise ValueError(f"{name} is {value}; it must be 0 to 4294967295")
+            return STATUS_OK, (int(request.full_samples), int(request.coarsest_shading_px),
                                None if region is None else tuple(int(side) for side in region))
 
         memory = [pixels, moved, state_before, state_after, *(video or ())]

@@ -400,24 +400,28 @@ public:
                 Py_BuildValue("IINN", geometry.object, geometry.is_visible, view(geometry.positions, size).release(),
                               geometry.normals ? view(geometry.normals, size).release() : Py_NewRef(Py_None))));
         }
-        const Answer answer =
-            call("render", "IKdNNNNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence),
-                 request.time_s, view_of(&request.camera).release(),
-                 view(motion ? motion->moved : nullptr, motion ? motion->moved_count * sizeof *motion->moved : 0)
-                     .release(),
-                 tuple_of(std::move(deformed)).release(),
-                 request.video ? views_of_planes(*request.video->format, request.video->plane, PyBUF_READ).release()
-                               : Py_NewRef(Py_None),
-                 state_view(request.state_before, PyBUF_READ), state_view(request.state_after, PyBUF_WRITE),
-                 (image.linear ? view(image.linear, image_size(image, 16), PyBUF_WRITE)
-                               : view(image.rgba, image_size(image, 4), PyBUF_WRITE))
-                     .release(),
-                 image.height, image.width, image.stride);
-        std::uint32_t full_samples = 0;
+        // An older host's structs lack fields.
+        const bool has_shading = request.struct_size > offsetof(arhost_render_request, shading_px);
+        const Answer answer = call(
+            "render", "IIKdNNNNNNNIII", request.max_samples, has_shading ? request.shading_px : 0,
+            static_cast<unsigned long long>(request.sequence), request.time_s, view_of(&request.camera).release(),
+            view(motion ? motion->moved : nullptr, motion ? motion->moved_count * sizeof *motion->moved : 0)
+                .release(),
+            tuple_of(std::move(deformed)).release(),
+            request.video ? views_of_planes(*request.video->format, request.video->plane, PyBUF_READ).release()
+                          : Py_NewRef(Py_None),
+            state_view(request.state_before, PyBUF_READ), state_view(request.state_after, PyBUF_WRITE),
+            (image.linear ? view(image.linear, image_size(image, 16), PyBUF_WRITE)
+                          : view(image.rgba, image_size(image, 4), PyBUF_WRITE))
+                .release(),
+            image.height, image.width, image.stride);
+        std::uint32_t full_samples = 0, coarsest_shading_px = 0;
         PyObject *region = nullptr; // borrowed
-        require(PyArg_ParseTuple(answer.value.get(), "IO", &full_samples, &region));
-        if (info.struct_size >= sizeof info) // an older host's struct lacks the field
+        require(PyArg_ParseTuple(answer.value.get(), "IIO", &full_samples, &coarsest_shading_px, &region));
+        if (info.struct_size > offsetof(arhost_render_info, full_samples))
             info.full_samples = full_samples;
+        if (info.struct_size > offsetof(arhost_render_info, coarsest_shading_px))
+            info.coarsest_shading_px = coarsest_shading_px;
         if (region != Py_None) {
             info.has_region = 1;
             require(PyArg_ParseTuple(region, "IIII", &info.region_x, &info.region_y, &info.region_width,

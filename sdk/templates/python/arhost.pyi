@@ -563,6 +563,8 @@ class Deformed(Protocol):
 class RenderRequest(Protocol):
     max_samples: int
     full_samples: int
+    shading_px: int
+    coarsest_shading_px: int
     sequence: int
     time_s: float
     camera: Camera

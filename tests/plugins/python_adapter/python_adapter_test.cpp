@@ -372,7 +372,7 @@ TEST_F(PythonAdapter, PrintedLinesOfAnyLengthAreLoggedInParts) {
         EXPECT_THAT(run.output(), HasSubstr(part));
 }
 
-TEST_F(PythonAdapter, ARaytracerCanObeyTheLimitOfSamples) {
+TEST_F(PythonAdapter, ARaytracerCanObeyTheLimitsOfSamplesAndShading) {
     ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_counter, fps: 30, options: {frames: 60}}\n"
                   "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
                   "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}\n"
@@ -385,16 +385,18 @@ TEST_F(PythonAdapter, ARaytracerCanObeyTheLimitOfSamples) {
                               "    def start(self, setup): pass\n"
                               "    def render(self, request, image):\n"
                               "        time.sleep(0.002)\n"
-                              "        request.full_samples = 8\n"
+                              "        request.full_samples, request.coarsest_shading_px = 8, 2\n"
                               "        image[...] = 0\n"
-                              "        if request.max_samples not in self.seen:\n"
-                              "            self.seen.add(request.max_samples)\n"
-                              "            self.host.info(f'at most {request.max_samples}')\n"),
+                              "        limits = request.max_samples, request.shading_px\n"
+                              "        if limits not in self.seen:\n"
+                              "            self.seen.add(limits)\n"
+                              "            self.host.info(f'limits {limits}')\n"),
               0)
         << run.output();
-    for (const char *limit : {"at most 0\n", "at most 8\n", "at most 2\n"})
-        EXPECT_THAT(run.output(), HasSubstr(limit));
+    for (const char *limits : {"limits (0, 1)\n", "limits (8, 1)\n", "limits (2, 2)\n"})
+        EXPECT_THAT(run.output(), HasSubstr(limits));
     EXPECT_EQ(run.stats()["quality"]["samples"], 2);
+    EXPECT_EQ(run.stats()["quality"]["shading_px"], 2);
 }
 
 TEST_F(PythonAdapter, StandardOutputAcceptsBytesAndHasADescriptor) {
