@@ -58,13 +58,19 @@ public:
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
         // An older host's struct lacks fields.
         const auto has = [&](std::size_t field) { return request.struct_size > field; };
-        const bool has_state =
-            has(offsetof(arhost_render_request, state_size)) && request.state_size >= renderer_->state_size();
+        StateSlots state; // none: images are not denoised
+        if (has(offsetof(arhost_render_request, state_size)) && request.state_size > 0) {
+            if (request.state_size < renderer_->state_size())
+                throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                                      "the state has " + std::to_string(request.state_size) +
+                                          " bytes; the host must provide as many as state_size() returns, " +
+                                          std::to_string(renderer_->state_size()));
+            state = {request.state_before, request.state_after};
+        }
         const Rectangle drawn =
             renderer_->render(request.camera, image, request.motion,
                               has(offsetof(arhost_render_request, video)) ? request.video : nullptr, request.sequence,
-                              has_state ? StateSlots{request.state_before, request.state_after} : StateSlots{},
-                              has(offsetof(arhost_render_request, shading_px)) ? request.shading_px : 1);
+                              state, has(offsetof(arhost_render_request, shading_px)) ? request.shading_px : 1);
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
             info.region_x = static_cast<std::uint32_t>(drawn.x0);
@@ -75,7 +81,7 @@ public:
         if (info.struct_size > offsetof(arhost_render_info, full_samples)) // an older host's struct lacks the fields
             info.full_samples = settings_.samples;
         if (info.struct_size > offsetof(arhost_render_info, coarsest_shading_px))
-            info.coarsest_shading_px = renderer_->state_size() > 0 ? 2 : 0;
+            info.coarsest_shading_px = renderer_->state_size() > 0 && state.after ? 2 : 0;
     }
 
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};

@@ -652,6 +652,8 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         return ARHOST_STATUS_ERROR_INTERNAL;
 
     arhost_render_request modified = *request;
+    modified.state_before = modified.state_after = nullptr; // `count` has the state
+    modified.state_size = 0;
     modified.camera = modify(request->camera);
     if (has("ignores_max_samples"))
         modified.max_samples = 0;

@@ -236,6 +236,23 @@ TEST_F(Denoising, IgnoresAStateOfAnotherVersionOrSize) {
     }
 }
 
+TEST(DenoisingOfStraightImages, RejectsAStateThatIsTooSmall) {
+    Tracer tracer(still_life(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+    std::array<std::byte, 64> state;
+    arhost_render_request request{};
+    request.struct_size = sizeof request;
+    request.camera = turned(0);
+    request.state_after = state.data();
+    request.state_size = state.size();
+    Picture picture(pinhole());
+    const arhost_image image = picture.image();
+    EXPECT_EQ(tracer.plugin().functions<arhost_raytracer>().render(tracer.plugin().instance(), &request, &image,
+                                                                   &picture.info),
+              ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_THAT(tracer.log(), testing::HasSubstr("the state has 64 bytes; the host must provide"));
+}
+
 TEST(Quality, DeterminesSamplesAndDenoising) {
     struct Case {
         Options options;
