@@ -6,6 +6,8 @@
 #include "conformance/process_usage.hpp"
 #include "conformance/tracer.hpp"
 
+#include <glm/gtc/matrix_transform.hpp>
+
 #include <limits>
 
 namespace arhost::conformance {
@@ -128,6 +130,46 @@ void max_samples(Context &context) {
                                  limit, full));
 }
 
+// Each face of the box has another brightness, and the lamp is so near that the brightness varies on each.
+scene::ArenaBuilder box_near_a_lamp() {
+    scene::ArenaBuilder builder = path_scene();
+    const glm::mat4 turned = glm::rotate(glm::mat4(1), 0.5f, glm::vec3(0, 0, 1));
+    builder.add_object("box", builder.add_triangles(box({35, 25, 20})),
+                       builder.add_material(diffuse(glm::vec3(0.8f))), ARHOST_ROLE_VIRTUAL, glm::mat4x3(turned));
+    builder.add_light(lamp({60, -120, 90}, 1));
+    return builder;
+}
+
+void shading(Context &context) {
+    Tracer tracer(context, box_near_a_lamp(), many_samples(context));
+    tracer.set_compositing(ARHOST_COMPOSITING_LINEAR);
+    std::optional<std::uint32_t> coarsest;
+    const auto render = [&](std::uint32_t shading_px) {
+        tracer.set_shading(shading_px);
+        Picture picture = tracer.render(still_life_camera());
+        const std::uint32_t now = tracer.info().coarsest_shading_px;
+        if (now != coarsest.value_or(now))
+            throw Failure(fmt::format("with shading_px {}, coarsest_shading_px is {}; before, it was {}", shading_px,
+                                      now, *coarsest));
+        coarsest = now;
+        return picture;
+    };
+    const Picture whole = render(0);
+    if (*coarsest < 2)
+        throw Skip(fmt::format("it ignores shading_px: its coarsest_shading_px is {}", *coarsest));
+    const Picture coarse = render(2);
+    if (!first_difference(coarse, whole, 0))
+        throw Failure(
+            fmt::format("its coarsest_shading_px is {}, but an image with shading_px 2 is the same", *coarsest));
+    expect_alike(coarse, whole,
+                 "with shading_px 2, edges must keep their resolution, and pixels that are not shaded have about the "
+                 "colour of those around",
+                 40);
+    for (const std::uint32_t all : {1u, 0u})
+        expect_alike(render(all), whole,
+                     fmt::format("after an image with shading_px 2, one with shading_px {} differs", all));
+}
+
 // ---- Unusual scenes --------------------------------------------------------------------------------
 
 // Expects that only a sphere of this radius, at the image's centre, is visible.
@@ -193,6 +235,9 @@ constexpr Test tests[] = {
     {"raytracer.max-samples",
      "With `max_samples`, an image takes the smaller of this number and `full_samples`, which does not depend on it.",
      "raytracer.render", 20s, max_samples},
+    {"raytracer.shading",
+     "With `shading_px` 2, edges keep their resolution; `coarsest_shading_px` and later images do not depend on it.",
+     "raytracer.render", 20s, shading},
     {"raytracer.degenerate", "Degenerate triangles do not affect the image.", "raytracer.render", 20s, degenerate},
     {"raytracer.far-away", "Scaling scene and camera from 0.2 m to 1 km does not change the image.",
      "raytracer.render", 20s, far_away},

@@ -124,8 +124,8 @@ template <class Image>
 arhost_status Tracer::try_render(const arhost_camera &camera, std::optional<Image> &slot, Image &picture,
                                  arhost_render_info &info, const arhost_motion *motion) {
     arhost_render_request request{
-        sizeof request, max_samples_, sequence_, 0,       camera, motion, video_ ? &video_->frame() : nullptr,
-        nullptr,        nullptr,      0,         nullptr, 0,      0};
+        sizeof request, max_samples_, sequence_, 0,       camera,      motion, video_ ? &video_->frame() : nullptr,
+        nullptr,        nullptr,      0,         nullptr, shading_px_, 0};
     if (state_before_ && state_before_size_ != state_size_)
         throw std::logic_error("the state is of another setup");
     if (state_size_ > 0) {

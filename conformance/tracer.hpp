@@ -62,6 +62,8 @@ public:
 
     // Of later requests; 0: no limit.
     void limit_samples(std::uint32_t max_samples) { max_samples_ = max_samples; }
+    // `shading_px` of later requests.
+    void set_shading(std::uint32_t shading_px) { shading_px_ = shading_px; }
     void set_sequence(std::uint64_t sequence) { sequence_ = sequence; }
     // Of later setups, so that requests may be smaller. Without this, a setup has the size of the request.
     void set_full_size(const arhost_intrinsics &intrinsics) { full_size_ = intrinsics; }
@@ -100,7 +102,7 @@ private:
     std::optional<Picture> straight_slot_;
     std::optional<LinearPicture> linear_slot_;
     arhost_render_info info_{};
-    std::uint32_t max_samples_ = 0;
+    std::uint32_t max_samples_ = 0, shading_px_ = 0;
     std::uint64_t sequence_ = 0, state_size_ = 0, state_before_size_ = 0;
     std::byte state_filler_{0xa5};
     std::unique_ptr<GuardedMemory> state_before_, state_after_; // null: none

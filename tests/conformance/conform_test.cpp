@@ -121,6 +121,8 @@ const Case cases[] = {
          {"skip     raytracer.translucent-shadow\n         ARHOST_RAYTRACER_CAPABILITY_GLASS is not declared",
           "skip     raytracer.moving-object\n         ARHOST_RAYTRACER_CAPABILITY_MOTION is not declared",
           "pass     raytracer.reference"}),
+    Case("PassesTheRayTracerThatShadesFewerPixels", "rt_embree --only raytracer.shading", 0,
+         {"pass     raytracer.shading"}),
     Case("DrawsTag36h11", "tracker_aruco --family tag36h11 --only tracker.start,tracker.corners", 0,
          {"with a marker of tag36h11"}),
     Case("DrawsDict6x6", "tracker_aruco --family DICT_6X6_250 --only tracker.start,tracker.corners", 0,

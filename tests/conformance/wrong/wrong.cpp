@@ -57,6 +57,7 @@ struct Wrong {
     bool was_started = false, is_tiny = false;
     unsigned users = 0;
     std::uint32_t max_samples = 0;        // of an earlier request
+    std::uint32_t shading_px = 0;         // likewise
     std::uint32_t images = 0;             // rendered so far
     std::uint32_t width = 0;              // of the setup
     std::int64_t threads = 0;             // the option
@@ -271,6 +272,8 @@ void modify(arhost_render_info &info, const arhost_image &image) {
         info.region_width -= 4;
     if (has("region_beyond_image"))
         info.region_width = image.width + 1;
+    if (has("coarse_edges") || has("ignores_shading_px") || has("keeps_shading_px"))
+        info.coarsest_shading_px = 2;
 }
 
 // ---- The plugin --------------------------------------------------------------------------------------
@@ -696,6 +699,13 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         return status;
 
     modify(pixels);
+    if (has("coarse_edges") && request->shading_px > 1)
+        for (std::uint32_t y = 0; y < image->height; ++y)
+            for (std::uint32_t x = 0; x < image->width; ++x)
+                std::copy_n(pixels.at(x & ~1u, y & ~1u), 4, pixels.at(x, y));
+    self.shading_px = std::max(self.shading_px, request->shading_px);
+    if (has("keeps_shading_px") && self.shading_px > 1)
+        pixels.each_colour([](double colour, double) { return std::min(1.0, colour + 0.02); });
     if (request->state_size > 0) {
         const unsigned images = count(self, *request, *image);
         pixels.each_colour([&](double colour, double) { return std::min(1.0, colour + 0.02 * images); });

@@ -101,8 +101,8 @@ typedef struct arhost_render_request {
      * ARHOST_RAYTRACER_CAPABILITY_ESTIMATE, and in this version always. */
     const void *estimate;
     /* Side of the squares of pixels of each of which only one needs to be shaded, in turn from image to image: 2 if
-     * the host lowers the quality in order to keep the frame rate; 0 or 1: all pixels. Edges keep their resolution.
-     * See `coarsest_shading_px` of arhost_render_info */
+     * the host lowers the quality in order to keep the frame rate; 0 or 1: all pixels. Edges keep their resolution;
+     * other pixels are filled from the shaded ones. See `coarsest_shading_px` of arhost_render_info */
     uint32_t shading_px;
     uint32_t reserved; /* 0 */
 } arhost_render_request;
