@@ -78,6 +78,17 @@ TEST(Statistics, ComputeFpsBetweenTheFirstAndTheLastFrame) {
     EXPECT_DOUBLE_EQ(statistics.fps(), 30);
 }
 
+TEST(Statistics, OmitTheLimitsOfTheQualityThatDoNotApply) {
+    Statistics statistics;
+    EXPECT_EQ(quality_json(statistics), nullptr);
+    statistics.quality = Quality();
+    EXPECT_EQ(quality_json(statistics), (nlohmann::ordered_json{{"scale", 1.0}, {"changes", 0}}));
+    statistics.quality = {.scale = 0.5, .samples = 3, .shading_px = 2};
+    statistics.quality_changes = 4;
+    EXPECT_EQ(quality_json(statistics),
+              (nlohmann::ordered_json{{"scale", 0.5}, {"changes", 4}, {"samples", 3}, {"shading_px", 2}}));
+}
+
 TEST(StageTimings, RecentOnesAreThoseOfTheLastTwoWindows) {
     using namespace std::chrono_literals;
     StageTimings timings;
