@@ -14,6 +14,7 @@ constexpr double scale_step = 0.84; // the resulting image has 0.7 times the pix
 constexpr double cost_of_quarter_shading = 0.65;
 constexpr std::size_t min_images = 3;
 constexpr std::chrono::milliseconds window_length{500};
+constexpr std::chrono::seconds time_to_follow{1};
 constexpr int fast_windows_to_raise = 4, windows_to_confirm = 10;
 
 // In units of the time per frame.
@@ -43,6 +44,19 @@ double cost(const Quality &quality) {
 }
 
 } // namespace
+
+bool AdaptableReports::add(const Adaptable &report, Clock::time_point now) {
+    if (latest_ == report) {
+        other_.reset();
+        return false;
+    }
+    if (std::exchange(other_, report) != report)
+        other_begin_ = now;
+    if (latest_ && now - other_begin_ < time_to_follow)
+        return false;
+    latest_ = std::exchange(other_, std::nullopt);
+    return true;
+}
 
 QualityController::QualityController(const Limits &limits) : limits_(limits), levels_(levels_of(limits)) {}
 

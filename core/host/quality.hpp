@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace arhost::host {
@@ -16,6 +17,28 @@ struct Quality {
     std::uint32_t samples = 0;    // maximum number per pixel; 0: no limit
     std::uint32_t shading_px = 1; // as in arhost_render_request, but never 0
     bool operator==(const Quality &) const = default;
+};
+
+// Fields of arhost_render_info.
+struct Adaptable {
+    std::uint32_t full_samples = 0, coarsest_shading_px = 0;
+    bool operator==(const Adaptable &) const = default;
+};
+
+// Follows what the images of a ray tracer report as adaptable. They may report something else only after a change of
+// an option; a faulty ray tracer whose reports alternate must not restart the controller with each image.
+class AdaptableReports {
+public:
+    using Clock = std::chrono::steady_clock;
+
+    // Records the report of an image that finished at `now`. Returns whether `latest` has changed: to the first
+    // report, or to one that all images of a second have repeated.
+    bool add(const Adaptable &report, Clock::time_point now);
+    const std::optional<Adaptable> &latest() const { return latest_; } // empty before the first report
+
+private:
+    std::optional<Adaptable> latest_, other_; // other_: what the last images report instead, since `other_begin_`
+    Clock::time_point other_begin_{};
 };
 
 // Chooses among levels of quality: first fewer samples, then fewer pixels that are shaded, then smaller images. To

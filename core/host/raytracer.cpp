@@ -189,7 +189,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
         statistics.stages.add("device", device);
     if (const Frame *frame = parts_.flow.find(command.sequence); frame && quality_) {
         if (result.status >= 0) {
-            set_adaptable({result.render.full_samples, result.render.coarsest_shading_px < 2 ? 0u : 2u});
+            add_report({result.render.full_samples, result.render.coarsest_shading_px < 2 ? 0u : 2u});
             statistics.quality_changes += quality_->add(frame->quality, busy, parts_.context.reactor.now());
         }
         statistics.quality = quality_->current();
@@ -223,13 +223,13 @@ void Raytracer::start_quality() {
         return;
     const PluginDescription &plugin = component().description();
     if (std::exchange(adapted_plugin_, plugin.id) != plugin.id)
-        adaptable_.reset();
+        reports_ = {};
     const auto supports = [&](std::uint64_t capability) { return (plugin.capabilities & capability) != 0; };
     QualityController::Limits limits{.target_fps = run.target_fps};
     // If the worker warps the images because the plugin does not support lenses, they must have full size.
     if (supports(ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES) && !warps_images(plugin))
         limits.min_scale = run.min_scale;
-    const Adaptable adaptable = adaptable_.value_or(Adaptable());
+    const Adaptable adaptable = reports_.latest().value_or(Adaptable());
     limits.max_samples = adaptable.full_samples;
     limits.min_samples = std::min(run.min_samples, limits.max_samples);
     limits.max_shading_px = adaptable.coarsest_shading_px;
@@ -237,14 +237,12 @@ void Raytracer::start_quality() {
         quality_.emplace(limits);
 }
 
-// The first image of a plugin tells what is adaptable, and an option may change it.
-void Raytracer::set_adaptable(const Adaptable &adaptable) {
-    const bool is_first = !adaptable_;
-    if (adaptable_ == adaptable)
+void Raytracer::add_report(const Adaptable &report) {
+    const bool is_first = !reports_.latest();
+    if (!reports_.add(report, parts_.context.reactor.now()))
         return;
-    adaptable_ = adaptable;
     start_quality();
-    if (is_first && adaptable == Adaptable() && quality_->is_lowest() && parts_.configuration.min_scale < 1)
+    if (is_first && report == Adaptable() && quality_->is_lowest() && parts_.configuration.min_scale < 1)
         component().log(ARHOST_SEVERITY_WARNING,
                         component().description().short_name() +
                             " can render neither smaller images nor fewer samples, nor shade fewer pixels; "

@@ -42,12 +42,6 @@ public:
     const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
 
 private:
-    // Fields of arhost_render_info.
-    struct Adaptable {
-        std::uint32_t full_samples = 0, coarsest_shading_px = 0;
-        bool operator==(const Adaptable &) const = default;
-    };
-
     supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) override;
     ipc::SlotLayout on_ready(const ipc::messages::Ready &ready) override;
     void on_running() override { start_quality(); }
@@ -56,7 +50,7 @@ private:
     bool warps_images(const model::PluginDescription &plugin) const;
     OverlayFormat choose_format(const model::PluginDescription &plugin) const;
     void start_quality();
-    void set_adaptable(const Adaptable &adaptable);
+    void add_report(const Adaptable &report);
     void write_anchors(const Frame &frame) const;
 
     const Configuration configuration_;
@@ -67,7 +61,7 @@ private:
     bool reads_video_ = false, has_state_ = false;
     std::optional<QualityController> quality_; // only with `live.target_fps`
     std::string adapted_plugin_;               // the plugin whose quality is adapted
-    std::optional<Adaptable> adaptable_;       // of that plugin; empty before the first image
+    AdaptableReports reports_;                 // of that plugin
 };
 
 } // namespace arhost::host

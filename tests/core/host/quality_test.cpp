@@ -176,6 +176,29 @@ TEST(Quality, DoesNotTryAgainWhatWasTooSlow) {
     EXPECT_EQ(controller.current().samples, 2u) << "the load has decreased";
 }
 
+TEST(AdaptableReports, AreFollowedIfAllImagesOfASecondRepeatThem) {
+    AdaptableReports reports;
+    auto now = AdaptableReports::Clock::time_point(1h);
+    const Adaptable first{8, 2}, second{4, 2};
+    EXPECT_FALSE(reports.latest());
+    EXPECT_TRUE(reports.add(first, now));
+    EXPECT_EQ(reports.latest(), first);
+    for (int i = 0; i < 10; ++i, now += 100ms)
+        EXPECT_FALSE(reports.add(second, now));
+    EXPECT_EQ(reports.latest(), first);
+    EXPECT_TRUE(reports.add(second, now));
+    EXPECT_EQ(reports.latest(), second);
+}
+
+TEST(AdaptableReports, AreIgnoredIfTheyAlternate) {
+    AdaptableReports reports;
+    auto now = AdaptableReports::Clock::time_point(1h);
+    for (int i = 0; i < 300; ++i, now += 33ms)
+        EXPECT_EQ(reports.add({8, i % 3 == 1 ? 0u : 2u}, now), i == 0) << i;
+    for (std::uint32_t i = 0; i < 300; ++i, now += 33ms)
+        EXPECT_FALSE(reports.add({8 + i, 2}, now)) << i;
+}
+
 TEST(Quality, IgnoresASingleSlowImageAndImagesOfAnotherQuality) {
     QualityController controller(full_limits);
     auto now = QualityController::Clock::time_point(1h);
