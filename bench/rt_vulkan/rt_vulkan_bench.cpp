@@ -2,12 +2,11 @@
 //
 // Measures rt_vulkan's speed and leaks.
 //
-//   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]
+//   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|PATH [EYE_X Y Z AT_X Y Z]
 //
 // compares the time of an image with that of a bare trace: a shader that traces the same primary rays with the same
-// trace(), but writes only distances (bare.glsl). `auto` measures the path that the plugin would choose on this GPU
-// (compute shader, ray queries or ray tracing pipeline), `all` each path that the GPU supports. Prints one line of
-// JSON per path.
+// trace(), but writes only distances (bare.glsl). PATH is `plain`, `query` or `pipeline`; `auto` is the one that the
+// plugin would choose on this GPU. Prints JSON.
 //
 //   rt-vulkan-bench run IMAGES EVERY SCENE.yaml…
 //
@@ -177,18 +176,14 @@ int trace(const std::vector<std::string> &words) {
     const rt_vulkan::Instance instance(host, false);
     const auto devices = instance.devices();
     const rt_vulkan::PhysicalDevice &device = rt_vulkan::choose_device(devices, "auto");
-    const std::vector<rt_vulkan::Path> paths =
-        words[5] == "all" ? device.paths : std::vector{rt_vulkan::choose_paths(device, words[5])[0]};
-    for (const rt_vulkan::Path path : paths) {
-        nlohmann::json line =
-            measured(device, host, path, arena,
-                     camera_from(from, arena.scene().axes == ARHOST_AXES_Z_UP && !is_bunny, width, height),
-                     std::stoi(words[4]));
-        line["device"] = device.name;
-        line["is_gpu"] = device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
-        std::printf("%s\n", line.dump().c_str());
-        std::fflush(stdout);
-    }
+    nlohmann::json line = measured(
+        device, host, rt_vulkan::choose_paths(device, words[5])[0], arena,
+        camera_from(from, arena.scene().axes == ARHOST_AXES_Z_UP && !is_bunny, width, height), std::stoi(words[4]));
+    line["device"] = device.name;
+    line["is_gpu"] = device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
+    for (const rt_vulkan::Path path : device.paths)
+        line["paths"].push_back(rt_vulkan::name_of(path));
+    std::printf("%s\n", line.dump().c_str());
     return 0;
 }
 
@@ -229,7 +224,7 @@ int main(int argc, char **argv) try {
     if (words.size() > 3 && words[0] == "run")
         return run(words);
     std::fprintf(stderr,
-                 "usage: rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]\n"
+                 "usage: rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|PATH [EYE_X Y Z AT_X Y Z]\n"
                  "       rt-vulkan-bench run IMAGES EVERY SCENE.yaml...\n");
     return 2;
 } catch (const std::exception &error) {
