@@ -47,13 +47,8 @@ void blend_row(const std::uint8_t *bgr, const std::uint8_t *overlay, const Overl
         rows::blend(bgr, overlay, out, count);
 }
 
-constexpr std::uint32_t one = 128; // weights are multiples of 1/128, so that the sums fit in 32 bits
-
-// The two adjacent pixels of the small image between which a pixel of the large image is interpolated, and the weight
-// of the second.
-struct Between {
-    std::uint32_t first, second, weight;
-};
+using rows::Between;
+constexpr std::uint32_t one = Between::one;
 
 Between between(std::uint32_t at, std::uint32_t from_size, std::uint32_t to_size) {
     const double position =
@@ -85,20 +80,6 @@ void mix_straight(const std::uint8_t *const (&corners)[4], const std::uint32_t (
     to[3] = static_cast<std::uint8_t>((alpha + one * one / 2) / (one * one));
 }
 
-void mix_linear(const std::uint8_t *const (&corners)[4], const std::uint32_t (&weights)[4], std::uint8_t *to) {
-    LinearPixel pixels[4];
-    for (int i = 0; i < 4; ++i)
-        std::memcpy(&pixels[i], corners[i], sizeof pixels[i]);
-    LinearPixel mixed = pixels[0];
-    if (std::ranges::count(pixels, mixed) < 4) {
-        LinearSum sum;
-        for (int i = 0; i < 4; ++i)
-            sum.add(pixels[i], static_cast<float>(weights[i]) / (one * one));
-        mixed = sum.pixel();
-    }
-    std::memcpy(to, &mixed, sizeof mixed);
-}
-
 } // namespace
 
 Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t from_height, const Region &region,
@@ -115,16 +96,19 @@ Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t f
     for (std::uint32_t y = y0; y < y1; ++y) {
         const Between row = between(y, from_height, format.height);
         std::uint8_t *to = pixels + y * stride + x0 * image.format.pixel_bytes();
+        if (image.format.is_linear()) {
+            rows::interpolate_light(reinterpret_cast<const std::uint16_t *>(image.at(0, row.first)),
+                                    reinterpret_cast<const std::uint16_t *>(image.at(0, row.second)), row.weight,
+                                    columns.data(), reinterpret_cast<std::uint16_t *>(to), columns.size());
+            continue;
+        }
         for (const Between &column : columns) {
             const std::uint8_t *corners[] = {image.at(column.first, row.first), image.at(column.second, row.first),
                                              image.at(column.first, row.second), image.at(column.second, row.second)};
             const std::uint32_t weights[] = {(one - column.weight) * (one - row.weight),
                                              column.weight * (one - row.weight), (one - column.weight) * row.weight,
                                              column.weight * row.weight};
-            if (image.format.is_linear())
-                mix_linear(corners, weights, to);
-            else
-                mix_straight(corners, weights, to);
+            mix_straight(corners, weights, to);
             to += image.format.pixel_bytes();
         }
     }

@@ -35,6 +35,21 @@ void add_light(Bytes bgr, const std::uint16_t *linear, std::uint8_t *out, std::s
                                  : added_and_transmitted(linear[2 - c], linear[6 - c], bgr[3 * i + c]);
 }
 
+void interpolate_light(const std::uint16_t *above, const std::uint16_t *below, std::uint32_t row_weight,
+                       const Between *columns, std::uint16_t *out, std::size_t count) {
+    const auto mix = [](float a, float b, std::uint32_t weight) {
+        return a + static_cast<float>(weight) / Between::one * (b - a);
+    };
+    for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t c = 0; c < 8; ++c) {
+            const auto in_row = [&](const std::uint16_t *row) {
+                return mix(float_of(row[8 * std::size_t{columns[i].first} + c]),
+                           float_of(row[8 * std::size_t{columns[i].second} + c]), columns[i].weight);
+            };
+            out[8 * i + c] = half_of(mix(in_row(above), in_row(below), row_weight));
+        }
+}
+
 void blend(Bytes bgr, Bytes rgba, std::uint8_t *out, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i)
         for (std::size_t c = 0; c < 3; ++c)
@@ -198,6 +213,36 @@ HWY_INLINE auto floats_of(const std::uint16_t *halves) {
     const hn::Rebind<hwy::float16_t, decltype(df4)> d_half;
     return hn::PromoteTo(df4, hn::LoadU(d_half, reinterpret_cast<const hwy::float16_t *>(halves)));
 #endif
+}
+
+using Floats = decltype(hn::Zero(df4));
+
+HWY_INLINE void store_halves(Floats numbers, std::uint16_t *halves) {
+#if HWY_ARCH_X86 && HWY_TARGET > HWY_AVX2
+    float each[4];
+    hn::StoreU(numbers, df4, each);
+    for (std::size_t i = 0; i < 4; ++i)
+        halves[i] = half_of(each[i]);
+#else
+    const hn::Rebind<hwy::float16_t, decltype(df4)> d_half;
+    hn::StoreU(hn::DemoteTo(d_half, numbers), d_half, reinterpret_cast<hwy::float16_t *>(halves));
+#endif
+}
+
+HWY_INLINE Floats mix(Floats a, Floats b, std::uint32_t weight) {
+    return hn::MulAdd(hn::Set(df4, static_cast<float>(weight) / Between::one), hn::Sub(b, a), a);
+}
+
+void interpolate_light(const std::uint16_t *above, const std::uint16_t *below, std::uint32_t row_weight,
+                       const Between *columns, std::uint16_t *out, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t part = 0; part < 8; part += 4) { // added light, transmittance
+            const auto in_row = [&](const std::uint16_t *row) HWY_ATTR {
+                return mix(floats_of(row + 8 * std::size_t{columns[i].first} + part),
+                           floats_of(row + 8 * std::size_t{columns[i].second} + part), columns[i].weight);
+            };
+            store_halves(mix(in_row(above), in_row(below), row_weight), out + 8 * i + part);
+        }
 }
 
 // Works in steps over a chunk, because a vector load that follows the stores of its parts at once is slow.
@@ -378,6 +423,7 @@ namespace arhost::rows {
 
 HWY_EXPORT(blend);
 HWY_EXPORT(add_light);
+HWY_EXPORT(interpolate_light);
 HWY_EXPORT(bgr_from_grey);
 HWY_EXPORT(bgr_from_rgb);
 HWY_EXPORT(bgr_from_yuyv);
@@ -393,6 +439,10 @@ void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out,
 }
 void add_light(const std::uint8_t *bgr, const std::uint16_t *linear, std::uint8_t *out, std::size_t count) {
     HWY_DYNAMIC_DISPATCH(add_light)(bgr, linear, out, count);
+}
+void interpolate_light(const std::uint16_t *above, const std::uint16_t *below, std::uint32_t row_weight,
+                       const Between *columns, std::uint16_t *out, std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(interpolate_light)(above, below, row_weight, columns, out, count);
 }
 void bgr_from_grey(const std::uint8_t *grey, std::uint8_t *bgr, std::size_t count) {
     HWY_DYNAMIC_DISPATCH(bgr_from_grey)(grey, bgr, count);

@@ -19,6 +19,17 @@ void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out,
 // be `bgr`.
 void add_light(const std::uint8_t *bgr, const std::uint16_t *linear, std::uint8_t *out, std::size_t count);
 
+// Two adjacent pixels or rows between which another one is interpolated, and the weight of the second.
+struct Between {
+    static constexpr std::uint32_t one = 128; // small, so that sums of weighted straight pixels fit in 32 bits
+    std::uint32_t first, second, weight;      // weight: in units of 1/one
+};
+
+// Interpolates `count` pixels of an image of ARHOST_IMAGE_FORM_LINEAR, each between two columns of the rows `above`
+// and `below`; `row_weight` is the weight of `below`. Equal finite pixels are not changed.
+void interpolate_light(const std::uint16_t *above, const std::uint16_t *below, std::uint32_t row_weight,
+                       const Between *columns, std::uint16_t *out, std::size_t count);
+
 // Convert to BGR. For YUV formats, `count` must be even, and chroma is replicated.
 void bgr_from_grey(const std::uint8_t *grey, std::uint8_t *bgr, std::size_t count);
 void bgr_from_rgb(const std::uint8_t *rgb, std::uint8_t *bgr, std::size_t count);

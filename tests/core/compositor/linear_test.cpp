@@ -194,6 +194,40 @@ TEST(Enlarge, InterpolatesLightAndTransmittance) {
     EXPECT_EQ(large[8 * region.y + region.x], untouched);
 }
 
+TEST(Enlarge, InterpolatesLinearPixelsOnEachInstructionSet) {
+    constexpr std::size_t from = 50, count = 200;
+    std::mt19937 random(1);
+    std::vector<LinearPixel> images[2];
+    for (auto &row : images)
+        for (std::size_t i = 0; i < from; ++i)
+            row.push_back(i < 10 ? pixel_of(0x3p-24f, 1.5f)
+                                 : pixel_of(random() % 1000 / 300.0f, random() % 1000 / 999.0f));
+    std::vector<rows::Between> columns;
+    for (std::uint32_t i = 0; i < count; ++i)
+        columns.push_back(
+            {i / 4, std::min<std::uint32_t>(i / 4 + 1, from - 1), static_cast<std::uint32_t>(random() % 129)});
+    test::on_each_instruction_set([&] {
+        std::vector<LinearPixel> out(count);
+        rows::interpolate_light(images[0].data()->added, images[1].data()->added, 32, columns.data(),
+                                out.data()->added, count);
+        for (std::size_t i = 0; i < count; ++i) {
+            if (columns[i].second < 10) {
+                ASSERT_EQ(out[i], images[0][0]) << "equal pixels";
+                continue;
+            }
+            const auto expected = [&](auto member) {
+                const auto in_row = [&](const std::vector<LinearPixel> &row) {
+                    return std::lerp(float_of((row[columns[i].first].*member)[1]),
+                                     float_of((row[columns[i].second].*member)[1]), columns[i].weight / 128.0f);
+                };
+                return std::lerp(in_row(images[0]), in_row(images[1]), 0.25f);
+            };
+            ASSERT_NEAR(float_of(out[i].added[1]), expected(&LinearPixel::added), 2e-3);
+            ASSERT_NEAR(float_of(out[i].transmittance[1]), expected(&LinearPixel::transmittance), 2e-3);
+        }
+    });
+}
+
 TEST(StraightFromLinear, IsExactWhereVideoIsHiddenOrUnchanged) {
     const std::vector<LinearPixel> linear{untouched, pixel_of(0.5f, 0), pixel_of(0.25f, 0.5f), pixel_of(0, 0.25f),
                                           pixel_of(0.1f, 1.5f)};
