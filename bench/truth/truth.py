@@ -7,7 +7,7 @@ Renders rooms with Blender Cycles, without virtual objects (plate) and with them
 the plate, and prints the differences. --quick: one view, 32 samples. --other: other rooms. --moving: a moving camera in
 all rooms, with `quality: realtime`; --moving --quick: two frames of one room, 4 samples. Pictures are kept in build/truth,
 truth-quick, truth-moving or truth-moving-quick; what exists is not rendered again. The first run takes hours on two cores,
-or one hour with --moving."""
+or less than one with --moving."""
 import gzip
 import json
 import os
@@ -42,8 +42,9 @@ VIEWS = [str(view) for view in range(1 if QUICK else len(rooms.VIEWS))]
 if MOVING:
     ROOMS = rooms.ROOMS[:1] if QUICK else rooms.ROOMS + rooms.OTHER_ROOMS
     VIEWS = [f"m{frame}" for frame in range(2 if QUICK else rooms.MOVING_FRAMES)]
-# Of a moving camera. The codes and FLIP are those of the last frames, when the denoiser has a history.
-FIRST_FRAMES, LAST_FRAMES = 4, 8
+# Frames of a moving camera that are compared with the truth. The targets are for the last ones, when the denoiser has
+# a history.
+FIRST_VIEWS, LAST_VIEWS = VIEWS[:4], VIEWS[-8:]
 LARGEST_CODES, LARGEST_MEAN_CODES, LARGEST_MEAN_FLIP = 8, 6, 0.15
 
 
@@ -162,34 +163,33 @@ def write_film(file, pictures):
 def measure_moving(room):
     """The differences with a moving camera, by row of the table. Writes a film, and a sheet of the last frame."""
     light, last = scenes.known_light(room, "path"), VIEWS[-1]
-    realtime = augmented(room, "realtime", light, room.table_roughness, options="quality: realtime")
+    plates = {view: photo(room, "plate", view) for view in VIEWS}
+    realtime = dict(zip(VIEWS, augmented(room, "realtime", light, room.table_roughness, options="quality: realtime")))
     reference = augmented(room, "reference", light, room.table_roughness, views=[last])
-    plates = [photo(room, "plate", view) for view in VIEWS]
-    truths = [photo(room, "truth", view) for view in VIEWS]
-    areas = [areas_of(room, view) for view in VIEWS]
-    film = [np.concatenate([truth, picture, np.minimum(4 * np.abs(picture.astype(int) - truth), 255).astype(np.uint8)], 1)
-            for picture, truth in zip(realtime, truths)]
-    write_film(os.path.join(FOLDER, room.name + ".mp4"), film)
-    sheet = [plates[-1], truths[-1], realtime[-1], reference[0]]
+    write_film(os.path.join(FOLDER, room.name + ".mp4"),
+               [np.concatenate([plates[view], realtime[view]], 1) for view in VIEWS])
+    sheet = [plates[last], photo(room, "truth", last), realtime[last], reference[0]]
     Image.fromarray(np.concatenate(sheet, 1)).save(os.path.join(FOLDER, room.name + ".png"))
 
-    def differences(pictures, frames):
-        return measure.compare(pictures, truths[frames], areas[frames])
+    def differences(pictures, views):
+        return measure.compare(pictures, [photo(room, "truth", view) for view in views],
+                               [areas_of(room, view) for view in views])
 
-    first, newest, final = slice(FIRST_FRAMES), slice(-LAST_FRAMES, None), slice(-1, None)
-    return {"nothing, last 8": differences(plates[newest], newest),
-            "realtime, first 4": differences(realtime[first], first),
-            "realtime, last 8": differences(realtime[newest], newest),
-            "realtime, last 1": differences(realtime[final], final),
-            "reference, last 1": differences(reference, final),
-            "floor, last 1": differences([photo(room, "again", last)], final)}
+    def of(pictures, views):
+        return differences([pictures[view] for view in views], views)
+
+    return {"nothing, last 8": of(plates, LAST_VIEWS), "realtime, first 4": of(realtime, FIRST_VIEWS),
+            "realtime, last 8": of(realtime, LAST_VIEWS), "realtime, last 1": of(realtime, [last]),
+            "reference, last 1": differences(reference, [last]),
+            "floor, last 1": differences([photo(room, "again", last)], [last])}
 
 
 def moving():
     results = {}
     for room in ROOMS:
-        render([f"{room.name}/probe/0", *(f"{room.name}/{picture}/{view}" for view in VIEWS for picture in ("plate", "truth")),
-                f"{room.name}/again/{VIEWS[-1]}"])
+        render([f"{room.name}/{picture}" for picture in (
+            "probe/0", *(f"plate/{view}" for view in VIEWS),
+            *(f"truth/{view}" for view in dict.fromkeys(FIRST_VIEWS + LAST_VIEWS)), f"again/{VIEWS[-1]}")])
         results[room.name] = measure_moving(room)
         print(f"{room.name}: " + ", ".join(f"{name}: {row['all']['codes']:.2f}" for name, row in results[room.name].items())
               + " codes", flush=True)
