@@ -173,6 +173,7 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
 
     denoising_.before_from_now = nullptr;
     denoising_.camera_moved = false;
+    denoising_.objects_moved = moves;
     denoising_.pixel_angle = static_cast<float>(1 / intrinsics.fx);
     denoising_.flat_surface = flat_catcher < 0 ? 0 : surface_number(flat_catcher, real_surface);
     // The numbers of frames may have gaps, such as three of four.

@@ -259,8 +259,8 @@ constexpr std::int32_t unchanged_surface = most_surfaces - 4 + real_surface;
 enum GuideRow : int {
     position_guide,                    // three rows: mm, in world axes
     normal_guide = position_guide + 3, // three rows: unit vector
-    albedo_guide = normal_guide + 3,   // three rows: the factor of the denoised light; in mirrors and glass, a mean
-                                       // over frames of Scratch::seen
+    albedo_guide = normal_guide + 3,   // three rows: the factor of the denoised light; in mirrors and glass,
+                                       // Scratch::seen, if nothing moves a mean over frames
     surface_guide = albedo_guide + 3,  // an int's bits: number of the surface (surface_of() in guides.inl); 0: none;
                                        // unchanged_surface: the other guides and the light are not set
     guide_rows
@@ -328,7 +328,7 @@ struct Denoising {
     Layer objects, catchers, gloss;
     unsigned *taps; // of pixels at edges: see tap_count in denoise.inl
     Camera camera_before;
-    bool camera_moved;
+    bool camera_moved, objects_moved;
     float pixel_angle;         // width of a pixel in the middle of the image, in units of its distance
     bool finds_change;         // whether to look for light that has changed
     std::int32_t flat_surface; // number of that of PathScene::wide_catcher; 0: there is none
@@ -341,7 +341,7 @@ struct Denoising {
     // axes. NULL if no placement has changed.
     const float *before_from_now;
     // Whether what curved mirrors and glass show may move over them.
-    bool seen_moves() const { return camera_moved || before_from_now; }
+    bool seen_moves() const { return camera_moved || objects_moved; }
 };
 
 // The content of an image: values of the option `show`, in the order of plugin.cpp.
@@ -389,8 +389,8 @@ inline constexpr std::int32_t tile_side = 32, tile_pixels = tile_side * tile_sid
 struct RayQueue {
     // The rows are: origin, direction and throughput (three floats each), inverse density, and Paths::pixel (an int's
     // bits). The inverse density is the reciprocal of the density per steradian of the path's last random direction,
-    // times the `sample_ratio` of enqueue_bounce(). It is 0 if there is no such direction, and negative if mirrors or
-    // glass have reflected or refracted the path since.
+    // times the `sample_ratio` of enqueue_bounce(). It is 0 if there is no such direction (−0 if there were other
+    // random choices), and negative if mirrors or glass have reflected or refracted the path since.
     static constexpr int rows = 11;
     float *values;
     std::int32_t count, capacity;
@@ -417,7 +417,7 @@ struct Scratch {
     float *radiance[3];
     float *sum[sum_rows]; // sums over all samples
     // Of mirrors and glass, three rows, sums over all samples: the light that they show of lamps, the environment and
-    // the video, and the albedo of the virtual objects that they show. It has little noise.
+    // the video, and the albedo of the virtual objects that they show. Paths with random choices do not count.
     float *seen[3];
     float *guide[guide_rows];
     DeferredPixels catchers, objects; // to be sampled

@@ -453,21 +453,39 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         const Bool counts = active & (is_new | (most > Float(2.0f)));
         const Float frames = select(counts, min(past.frames + more, most), Float(0.0f));
         const Float share = more / max(frames, Float(1.0f));
-        const Vec3 mean = past.light + (light - past.light) * share;
+        Vec3 mean = past.light + (light - past.light) * share;
         const Float value = min(luminance(light), Float(65504.0f));
         const Float first = past.moments[0] + (value - past.moments[0]) * share,
                     second = past.moments[1] + (value * value - past.moments[1]) * share;
         Float variance = max(second - first * first, Float(0.0f)) / max(frames, Float(1.0f));
         variance = select(frames < Float(8.0f), select(shows_surroundings, Float(0.0f), Float(unknown)), variance);
         variance = select(frames > Float(0.0f), variance, Float(no_light));
-        store3(layer.after, kept, select(active, mean, black()));
         if (layer.keeps_seen) {
-            Vec3 seen = load3(guides + albedo_guide, at);
-            if (!denoising.seen_moves())
-                seen = select(is_kind(surface, specular_surface), past.seen + (seen - past.seen) * share, seen);
+            const Vec3 now = load3(guides + albedo_guide, at);
+            Vec3 seen = now;
+            if (const Bool specular = active & is_kind(surface, specular_surface);
+                any(specular) && !denoising.seen_moves()) {
+                // Frames count in proportion to what they show, so that the product of the means is that of the
+                // light.
+                const auto weighted = [&](Float before, Float value, Float seen_before, Float seen_now)
+                    __attribute__((always_inline)) {
+                    const Float weight = seen_now * share;
+                    const Float all = max(seen_before * (Float(1.0f) - share) + weight, Float(1e-6f));
+                    return before + (value - before) * (weight / all);
+                };
+                mean = select(specular,
+                              Vec3{weighted(past.light.x, light.x, past.seen.x, now.x),
+                                   weighted(past.light.y, light.y, past.seen.y, now.y),
+                                   weighted(past.light.z, light.z, past.seen.z, now.z)},
+                              mean);
+                // The video may change.
+                const Float most = max(share, Float(1.0f / 8));
+                seen = select(specular, past.seen + (now - past.seen) * most, now);
+            }
             store3(layer.guides + albedo_guide, at, seen);
             store3(layer.after + seen_history, kept, select(active, seen, black()));
         }
+        store3(layer.after, kept, select(active, mean, black()));
         store(layer.after[moment_history] + kept, select(active, first, Float(0.0f)));
         store(layer.after[moment_history + 1] + kept, select(active, second, Float(0.0f)));
         store(layer.after[distance_history] + kept,

@@ -77,7 +77,7 @@ ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction
                 origin = select(here, above, origin);
                 next = select(here, reflected(s, towards), next);
                 arrived = arrived & ~here;
-            } else if (material.model == ARHOST_MATERIAL_GLASS) {
+            } else if (material.model == ARHOST_MATERIAL_GLASS && material.roughness == 0) {
                 const GlassScatter glass = scatter_at_glass(s, towards, material, {Float(0.0f), Float(0.0f)}, here);
                 const Bool reflects = here & (glass.reflectance > Float(0.5f));
                 origin = select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), origin);
@@ -89,7 +89,7 @@ ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction
             const Int mirror = bits_of(load(work.scratch.guide[surface_guide] + first_pixel));
             const Int seen = object_number(scene, rays.hit) & Int(1023);
             put_guides(work, first_pixel,
-                       {splat(frame.camera.eye) + direction * travelled, s.normal, white(),
+                       {splat(frame.camera.eye) + direction * travelled, s.normal, white() /* Scratch::seen */,
                         mirror + (seen + Int(1)) * Int(mirrored_unit)},
                        arrived);
         }

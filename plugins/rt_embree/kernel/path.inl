@@ -12,52 +12,74 @@
 // Paths of fewer bounces are not ended at random.
 constexpr std::uint32_t first_roulette_depth = 2;
 
-// Returns the paths from the eye that only mirrors and glass have scattered.
+// Returns the paths from the eye that only mirrors and glass have scattered, and no random choice.
 ARHOST_INLINE Bool is_seen(const Paths &paths) {
-    return (paths.inverse_density == Float(0.0f)) & ~changes_catcher(paths);
+    return (bits_of(paths.inverse_density) == Int(0)) & ~changes_catcher(paths);
 }
 
-// Ends paths at random, so that those that go on have about the same throughput, 1 / importance.
-ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughput, Float importance, Bool active) {
+// The inverse density of paths that only mirrors and glass have scattered, but also random choices: −0.
+ARHOST_INLINE Paths unseen_where(Paths paths, Bool random) {
+    const Int bits = bits_of(paths.inverse_density);
+    paths.inverse_density = float_of(select(random & (bits == Int(0)), Int(INT32_MIN), bits));
+    return paths;
+}
+
+// Ends paths at random, so that those that go on have about the same throughput, 1 / importance. `random`: 0 to 1.
+// Returns the lanes that go on; in these, updates `paths` and `throughput`.
+ARHOST_INLINE Bool survive(Paths &paths, Vec3 &throughput, Float importance, Float random, Bool active) {
     active = active & (largest(throughput) > Float(0.0f));
     if (paths.depth < first_roulette_depth || !any(active))
         return active;
     const Float chance = min(max(largest(throughput) * importance, Float(0.05f)), Float(1.0f));
     throughput = throughput * (Float(1.0f) / chance);
-    return active & (path_pair(work, paths, roulette_dimension).u < chance);
+    paths = unseen_where(paths, chance < Float(1.0f));
+    return active & (random < chance);
 }
 
-// Light that is seen through glass should have no noise (Scratch::seen).
-constexpr float importance_of_seen = 16;
+// Light that is seen in mirrors and through glass should have no noise (Scratch::seen).
+ARHOST_INLINE Float importance_of(const Work &work, const Paths &paths) {
+    constexpr float of_seen = 16;
+    return select(is_seen(paths) & bool_of(work.frame.denoising), Float(of_seen), Float(1.0f));
+}
 
-// Queues a reflected and a refracted ray.
-ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
-                                         const arhost_material &material, Bool active) {
-    const Pair uv = material.roughness > 0 ? path_pair(work, paths, facet_dimension) : Pair{};
+// Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly,
+// and for the denoiser where glass is seen. `choice`: 0 to 1; `roulette`: see survive().
+ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &from, const Surface &s, Vec3 direction,
+                                         const arhost_material &material, Float choice, Pair roulette, Bool active) {
+    const Pair uv = material.roughness > 0 ? path_pair(work, from, facet_dimension) : Pair{};
+    const Paths paths = unseen_where(from, bool_of(material.roughness > 0));
     const GlassScatter glass = scatter_at_glass(s, direction, material, uv, active);
     const Vec3 arriving = paths.throughput * glass.transmittance;
-    Vec3 by_reflection = arriving * splat(material.reflectivity) * (glass.unmasked_reflected * glass.reflectance),
-         by_refraction =
-             arriving * splat(material.refraction) * (glass.unmasked_refracted * (Float(1.0f) - glass.reflectance));
-    const Float importance = select(is_seen(paths), Float(importance_of_seen), Float(1.0f));
-    if (const Bool goes_on = survive(work, paths, by_reflection, importance, active); any(goes_on))
-        enqueue(work, paths, s.position + s.geometric_normal * s.offset, glass.reflected, by_reflection, goes_on);
-    if (const Bool goes_on = survive(work, paths, by_refraction, importance, active); any(goes_on))
-        enqueue(work, paths, s.position - s.geometric_normal * s.offset, glass.refracted, by_refraction, goes_on);
+    const Float importance = importance_of(work, paths);
+    const Bool both = bool_of(from.depth == 0) | (importance > Float(1.0f)), reflects = choice < glass.reflectance;
+    const auto follow = [&](Bool chosen, Vec3 origin, Vec3 towards, Vec3 throughput, Float share, Float random)
+        __attribute__((always_inline)) {
+        Paths next = paths;
+        throughput = throughput * select(both, share, Float(1.0f));
+        if (const Bool goes_on = survive(next, throughput, importance, random, active & (both | chosen));
+            any(goes_on))
+            enqueue(work, next, origin, towards, throughput, goes_on);
+    };
+    follow(reflects, s.position + s.geometric_normal * s.offset, glass.reflected,
+           arriving * splat(material.reflectivity) * glass.unmasked_reflected, glass.reflectance, roulette.u);
+    follow(~reflects, s.position - s.geometric_normal * s.offset, glass.refracted,
+           arriving * splat(material.refraction) * glass.unmasked_refracted, Float(1.0f) - glass.reflectance,
+           select(both, roulette.v, roulette.u));
 }
 
 // Queues one ray for each lane, scattered by the surface.
 ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit16 &rays, const Surface &s,
                                 Vec3 direction, Bool active) {
     const Vec3 to_eye = -direction;
-    const Pair choice = path_pair(work, paths, choice_dimension);
+    const Pair choice = path_pair(work, paths, choice_dimension),
+               roulette = paths.depth < first_roulette_depth ? Pair{} : path_pair(work, paths, roulette_dimension);
     Float mirror_chance(0.0f);
     Vec3 mirror_reflectance = black();
     Bool opaque = active;
     for_each_object(work.frame.scene, rays.hit, active, [&](const Object &object, Bool here) {
         const arhost_material &material = *object.material;
         if (material.model == ARHOST_MATERIAL_GLASS) {
-            scatter_path_in_glass(work, paths, s, direction, material, here);
+            scatter_path_in_glass(work, paths, s, direction, material, choice.v, roulette, here);
             opaque = opaque & ~here;
         } else if (material.model == ARHOST_MATERIAL_MIRROR) {
             mirror_reflectance = select(here, splat(material.reflectivity), mirror_reflectance);
@@ -72,8 +94,11 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
         return;
     const Bool mirrors = opaque & (choice.v < mirror_chance);
     Vec3 by_mirror = paths.throughput * mirror_reflectance * (Float(1.0f) / max(mirror_chance, Float(1e-6f)));
-    if (const Bool goes_on = survive(work, paths, by_mirror, Float(1.0f), mirrors); any(goes_on))
-        enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), by_mirror, goes_on);
+    Paths mirrored = unseen_where(paths, mirror_chance < Float(1.0f));
+    if (const Bool goes_on = survive(mirrored, by_mirror, importance_of(work, mirrored), roulette.u, mirrors);
+        any(goes_on))
+        enqueue(work, mirrored, s.position + s.geometric_normal * s.offset, reflected(s, direction), by_mirror,
+                goes_on);
     Bool scatters = opaque & ~mirrors & s.is_lit;
     if (!any(scatters))
         return;
@@ -90,26 +115,29 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
                       (Float(0.318309886f) / max(density * (Float(1.0f) - mirror_chance), Float(1e-20f)));
     scatters =
         scatters & (cosine > Float(0.0f)) & (dot(out, s.geometric_normal) > Float(0.0f)) & (density > Float(0.0f));
-    scatters = survive(work, paths, throughput, Float(1.0f), scatters);
+    Paths next = paths;
+    scatters = survive(next, throughput, Float(1.0f), roulette.u, scatters);
     if (any(scatters))
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, out, throughput, scatters,
                 Float(1.0f) / max(density, Float(1e-30f)));
 }
 
-// Adds to Scratch::seen of paths behind mirrors and glass.
-ARHOST_INLINE void add_seen(Work &work, const Paths &paths, Vec3 light, Bool active) {
+// Adds the light of surfaces behind mirrors and glass to Scratch::seen.
+ARHOST_FUNCTION void add_seen(Work &work, const Paths &paths, Vec3 light, Bool active) {
     if (!work.frame.denoising || paths.depth == 0)
         return;
     active = active & is_seen(paths);
     if (!any(active))
         return;
     const Vec3 arriving = paths.throughput * light;
-    const Float bound(work.frame.path.max_radiance);
+    const auto bounded = [&](Float value) __attribute__((always_inline)) { // as accumulate_path()
+        return select(value < Float(1e30f), min(value, Float(work.frame.path.max_radiance)), Float(0.0f));
+    };
     alignas(64) float values[3][lanes];
     alignas(64) int pixel[lanes];
-    store(values[0], min(arriving.x, bound));
-    store(values[1], min(arriving.y, bound));
-    store(values[2], min(arriving.z, bound));
+    store(values[0], bounded(arriving.x));
+    store(values[1], bounded(arriving.y));
+    store(values[2], bounded(arriving.z));
     store(pixel, paths.pixel);
     for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
         const int lane = __builtin_ctz(remaining);
@@ -344,7 +372,7 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Dir
             rest & is_kind(bits_of(load(work.scratch.guide[surface_guide] + first_pixel)), specular_surface);
         rest = rest & ~specular;
         if (any(specular)) {
-            if (work.frame.denoising->seen_moves()) // there is no mean over frames
+            if (work.frame.denoising->seen_moves()) // jitter would flicker
                 shade_path(work, hits.rays, specular, paths);
             else
                 shade_specular(work, hits, paths, direction_at, specular);

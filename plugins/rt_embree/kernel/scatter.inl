@@ -77,7 +77,8 @@ ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 dire
 
 // Adds rays that mirrors and glass reflect or refract.
 ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active) {
-    enqueue(work, from, origin, direction, throughput, active, -abs(from.inverse_density));
+    const Float density = from.inverse_density;
+    enqueue(work, from, origin, direction, throughput, active, select(density > Float(0.0f), -density, density));
 }
 
 // Reflected rays below this throughput are invisible.

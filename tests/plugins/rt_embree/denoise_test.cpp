@@ -113,6 +113,57 @@ TEST(DenoisingOfMirrors, ConvergesWhileTheCameraRests) {
     EXPECT_LT(difference(picture, truth, shows_them), 0.3 * noise);
 }
 
+// Mirrors and glass that show each other, and what they show when nothing or the camera moves.
+struct Seen {
+    const char *name;
+    void (*add)(SceneBuilder &scene);
+    double degrees_per_frame;
+};
+void add_second_mirror(SceneBuilder &scene) {
+    scene.add_mesh("second", quad({80, -60, 0}, {-80, -60, 0}, {-80, -60, 30}, {80, -60, 30}), mirror(0.9f));
+}
+void add_glass(SceneBuilder &scene) {
+    scene.add_ball("glass", {0, 20, 30, 30}, glass_of());
+}
+void add_metal(SceneBuilder &scene) {
+    arhost_material metal = scene::make_material(ARHOST_MATERIAL_METAL);
+    set3(metal.diffuse, 0.4f, 0.4f, 0.4f);
+    set3(metal.reflectivity, 0.5f, 0.5f, 0.5f);
+    scene.add_ball("metal", {0, 20, 30, 30}, metal);
+}
+class DenoisingOfWhatIsSeen : public testing::TestWithParam<Seen> {};
+INSTANTIATE_TEST_SUITE_P(Objects, DenoisingOfWhatIsSeen,
+                         testing::Values(Seen{"MirrorsAtRest", add_second_mirror, 0},
+                                         Seen{"MirrorsInMotion", add_second_mirror, 0.7},
+                                         Seen{"GlassAtRest", add_glass, 0}, Seen{"GlassInMotion", add_glass, 0.7},
+                                         Seen{"MetalAtRest", add_metal, 0}, Seen{"MetalInMotion", add_metal, 0.7}),
+                         [](const auto &info) { return std::string(info.param.name); });
+
+TEST_P(DenoisingOfWhatIsSeen, LosesNoLight) {
+    const auto make = [] {
+        SceneBuilder scene = still_life();
+        scene.add_mesh("mirror", quad({-80, 80, 1}, {80, 80, 1}, {80, 80, 100}, {-80, 80, 100}), mirror(0.9f));
+        GetParam().add(scene);
+        return scene;
+    };
+    LinearTracer tracer(make(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK) << tracer.log();
+    constexpr int frames = 12;
+    LinearPicture picture = tracer.render(turned(0), 0);
+    for (int i = 1; i < frames; ++i)
+        picture = tracer.render(turned(GetParam().degrees_per_frame * i), static_cast<std::uint64_t>(i));
+    const LinearPicture truth = picture_of(make(), converged, turned(GetParam().degrees_per_frame * (frames - 1)));
+    double light = 0, expected = 0;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            if (truth.value(x, y, 4) == 0) {
+                light += std::min(double{picture.value(x, y, 1)}, 4.0);
+                expected += std::min(double{truth.value(x, y, 1)}, 4.0);
+            }
+    ASSERT_GT(expected, 100);
+    EXPECT_NEAR(light / expected, 1, 0.03); // fireflies are bounded
+}
+
 // The table mirrors the objects, and not what they cover.
 TEST(DenoisingOfGloss, ConvergesWhileTheCameraRests) {
     const auto make = [] { return still_life(metallic_roughness({0.2f, 0.2f, 0.2f}, 0, 0.15f)); };
