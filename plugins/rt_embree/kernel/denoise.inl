@@ -265,7 +265,8 @@ ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int ro
                 top = floor(max(min(at.y + Float(1.0f / 64), Float(1e6f)), Float(-2.0f)));
     const Float along = max(at.x - left, Float(0.0f)), down = max(at.y - top, Float(0.0f));
     Float total(0.0f);
-    const bool any_specular = layer.keeps_seen && any(active & is_kind(surface, specular_surface));
+    const bool needs_seen =
+        layer.keeps_seen && !denoising.seen_moves() && any(active & is_kind(surface, specular_surface));
     for (int i = 0; i < 4; ++i) {
         const Int column = to_int(left) + Int(i & 1), line = to_int(top) + Int(i >> 1);
         const Float weight = (i & 1 ? along : Float(1.0f) - along) * (i >> 1 ? down : Float(1.0f) - down);
@@ -288,7 +289,7 @@ ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int ro
         add(past.moments[1], moment_history + 1);
         add(past.frames, frames_history);
         total = total + share;
-        if (!any_specular)
+        if (!needs_seen)
             continue;
         add(past.seen.x, seen_history);
         add(past.seen.y, seen_history + 1);

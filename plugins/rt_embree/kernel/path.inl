@@ -133,17 +133,8 @@ ARHOST_FUNCTION void add_seen(Work &work, const Paths &paths, Vec3 light, Bool a
     const auto bounded = [&](Float value) __attribute__((always_inline)) { // as accumulate_path()
         return select(value < Float(1e30f), min(value, Float(work.frame.path.max_radiance)), Float(0.0f));
     };
-    alignas(64) float values[3][lanes];
-    alignas(64) int pixel[lanes];
-    store(values[0], bounded(arriving.x));
-    store(values[1], bounded(arriving.y));
-    store(values[2], bounded(arriving.z));
-    store(pixel, paths.pixel);
-    for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
-        const int lane = __builtin_ctz(remaining);
-        for (int i = 0; i < 3; ++i)
-            work.scratch.seen[i][pixel[lane]] += values[i][lane];
-    }
+    add_to_pixels(work.scratch.seen, paths.pixel, {bounded(arriving.x), bounded(arriving.y), bounded(arriving.z)},
+                  active);
 }
 
 // The denoiser leaves bright single paths visible for many frames. So surfaces have wider highlights where another

@@ -28,6 +28,22 @@ ARHOST_INLINE Random random_of(const Work &work, const Paths &paths) {
     return {paths.pixel ^ Int(static_cast<int>(paths.depth << 12)), Int(static_cast<int>(work.seed)), work.sample};
 }
 
+// Adds to three rows. Lanes may have the same pixel.
+ARHOST_INLINE void add_to_pixels(float *const *rows, Int pixels, Vec3 values, Bool active) {
+    alignas(64) float x[lanes], y[lanes], z[lanes];
+    alignas(64) int pixel[lanes];
+    store(x, values.x);
+    store(y, values.y);
+    store(z, values.z);
+    store(pixel, pixels);
+    for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
+        const int i = __builtin_ctz(remaining);
+        rows[0][pixel[i]] += x[i];
+        rows[1][pixel[i]] += y[i];
+        rows[2][pixel[i]] += z[i];
+    }
+}
+
 ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, Bool active) {
     const Vec3 arriving = paths.throughput * radiance;
     float *const *to = work.scratch.radiance;
@@ -41,18 +57,7 @@ ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, B
         add(2, arriving.z);
         return;
     }
-    alignas(64) float x[lanes], y[lanes], z[lanes];
-    alignas(64) int pixel[lanes];
-    store(x, arriving.x);
-    store(y, arriving.y);
-    store(z, arriving.z);
-    store(pixel, paths.pixel);
-    for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
-        const int i = __builtin_ctz(remaining);
-        to[0][pixel[i]] += x[i];
-        to[1][pixel[i]] += y[i];
-        to[2][pixel[i]] += z[i];
-    }
+    add_to_pixels(to, paths.pixel, arriving, active);
 }
 
 // Adds a secondary ray for each active lane to the queue of the depth `from.depth`. `inverse_density`: see RayQueue.

@@ -73,22 +73,21 @@ ARHOST_INLINE void smooth_specular_edges(Work &work, const Tile &tile) {
     const arhost::raytracer_common::Sample &first = frame.samples[frame.sample_count - 1];
     constexpr std::uint32_t more_samples = 3;
     // With the first one, in each quarter of the pixel; around the centre, if the first one is there.
-    constexpr float around[more_samples][2] = {{0, -0.47f}, {0.41f, 0.235f}, {-0.41f, 0.235f}};
+    constexpr arhost::raytracer_common::Sample around[] = {{0, -0.47f}, {0.41f, 0.235f}, {-0.41f, 0.235f}};
     const bool is_central = frame.denoising->seen_moves();
     for (std::uint32_t i = 1; i <= more_samples && frame.goes_on(frame.progress); ++i) {
-        const auto half_a_pixel_further = [](float at) { return at < 0 ? at + 0.5f : at - 0.5f; };
-        const float x = is_central ? around[i - 1][0]
-                        : i & 1    ? half_a_pixel_further(first.x)
-                                   : first.x,
-                    y = is_central ? around[i - 1][1]
-                        : i & 2    ? half_a_pixel_further(first.y)
-                                   : first.y;
+        const auto half_a_pixel_further = [](float a) { return a < 0 ? a + 0.5f : a - 0.5f; };
+        arhost::raytracer_common::Sample at = is_central ? around[i - 1] : first;
+        if (!is_central && (i & 1) != 0)
+            at.x = half_a_pixel_further(at.x);
+        if (!is_central && (i & 2) != 0)
+            at.y = half_a_pixel_further(at.y);
         work.sample = frame.first_random + (i << 28); // far from those of all frames
         for_each_block(all, [&](int number, int, int, int, int) {
             if (edges[number] == 0)
                 return;
             const Bool active = ((Int(edges[number]) >> lane_numbers()) & Int(1)) == Int(1);
-            const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), x, y);
+            const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), at.x, at.y);
             if (!shade_specular_again(work, number * lanes, direction, active & (direction.x == direction.x)))
                 edges[number] = 0;
         });
