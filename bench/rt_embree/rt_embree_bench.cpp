@@ -148,7 +148,7 @@ private:
 // rtcIntersect16.
 Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settings, bool native_width) {
     const arhost_host host = arhost::bench::printing_host("rt-embree-bench");
-    rt_embree::ThreadPool threads(settings.threads);
+    arhost::raytracer_common::ThreadPool threads(settings.threads);
     const rt_embree::RayTable table(intrinsics(), false, threads);
     const rt_embree::EmbreeScene scene(arena.scene(), threads.thread_count(), settings.robust, arhost::Host(&host));
     struct alignas(64) Directions {
@@ -201,7 +201,7 @@ Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settin
 // rays to random points of the lamp.
 Timing time_bare_shadow_rays(const Arena &arena, const rt_embree::Settings &settings, int count) {
     const arhost_host host = arhost::bench::printing_host("rt-embree-bench");
-    rt_embree::ThreadPool threads(settings.threads);
+    arhost::raytracer_common::ThreadPool threads(settings.threads);
     const rt_embree::RayTable table(intrinsics(), false, threads);
     const rt_embree::EmbreeScene scene(arena.scene(), threads.thread_count(), settings.robust, arhost::Host(&host));
     const int packet_width = scene.view().packet_width;

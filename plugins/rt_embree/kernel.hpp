@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The kernel's input. It consists of plain data only: the kernel is compiled once per instruction set, and must not
-// share inline functions with other code (kernel/packet.hpp).
+// share inline functions with other code (raytracer_common/packets/packet.hpp).
 #pragma once
 
 #include "embree.hpp"
+#include "raytracer_common/denoiser/layers.hpp"
 #include "raytracer_common/photon_map.hpp"
 #include "raytracer_common/samples.hpp"
 #include "raytracer_common/source_record.hpp"
@@ -16,6 +17,8 @@
 #include <cstdint>
 
 namespace rt_embree {
+
+using namespace arhost::raytracer_common;
 
 // Bits of Embree's ray and geometry masks. A ray can hit an object only if their masks have a common bit.
 enum RoleMask : unsigned {
@@ -45,13 +48,6 @@ struct Object {
     // a ball; 0 if the object is not sampled as a light source. Radius of the ball in world space, mm; 0: a mesh.
     float emitter_density, ball_radius;
     std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride;
-};
-
-struct Texture {
-    const void *texels; // per texel: RGBA with 8 bits per channel (sRGB or linear), or four floats
-    std::int32_t width, height;
-    arhost_texel_format format;
-    arhost_wrap wrap_u, wrap_v;
 };
 
 struct Environment {
@@ -127,16 +123,6 @@ struct Rays {
     std::int32_t block_size() const { return 16 * dimensions * (has_derivatives ? 3 : 1); }
 };
 
-// The video under the overlay, undistorted coordinates to pixels as in arhost/camera.h.
-struct Video {
-    Texture image; // sRGB codes; `texels` is NULL if there is no video
-    float fx, fy, cx, cy;
-    arhost_distortion distortion;
-    float coefficients[ARHOST_MAX_DISTORTION];
-    float max_radius_squared;        // of (x/z, y/z) in the picture; the lens model is not valid beyond
-    float pixel_width, pixel_height; // of the overlay's pixels, whose grid covers the video, relative to its size
-};
-
 // The mirrors and glass objects towards which lamps send photons.
 struct Caustics {
     const float *spheres;              // centre and radius, mm
@@ -146,7 +132,7 @@ struct Caustics {
     std::uint32_t photon_count, first_number; // of this frame; offset into the random sequence
 };
 
-// As in arhost::raytracer_common::PhotonMap.
+// As in PhotonMap.
 struct PhotonGrid {
     const std::int32_t *numbers, *starts;
     std::int32_t bucket_mask; // number of buckets − 1
@@ -179,7 +165,7 @@ struct Photons {
     const float *photons; // nine floats each, as in Photon
     const std::int32_t *near;
     float low[3];
-    PhotonGrid levels[arhost::raytracer_common::PhotonMap::max_levels];
+    PhotonGrid levels[PhotonMap::max_levels];
     std::int32_t level_count;
     // With denoising: a hash table of PhotonCell. A cell is at the index PhotonCell::hash() modulo its size, a power
     // of two, or follows it; a cell with count 0 ends the search. `near`, `low` and the radii of `levels` are set,
@@ -235,146 +221,27 @@ struct Surroundings {
     int normal_axis() const { return 3 - axes[0] - axes[1]; }
 };
 
-struct Camera {
-    float eye[3];
-    float world_from_camera[9]; // column-major
-};
-
-// Kinds of surfaces.
-enum SurfaceKind : std::int32_t {
-    scattering_surface,
-    specular_surface, // mirrors and glass
-    real_surface,
-    glossy_surface
-};
-constexpr std::int32_t surface_number(std::int32_t object, SurfaceKind kind) {
-    return 4 * (object + 1) + kind;
-}
-constexpr std::int32_t most_surfaces = 1 << 20;
-// PathScene::wide_catcher where virtual objects do not change it.
-constexpr std::int32_t unchanged_surface = most_surfaces - 4 + real_surface;
-
-// Of the surface that the ray through the centre of a pixel meets, in a larger cell of one of its pixels, for the
-// denoiser.
-enum GuideRow : int {
-    position_guide,                    // three rows: mm, in world axes
-    normal_guide = position_guide + 3, // three rows: unit vector
-    albedo_guide = normal_guide + 3,   // three rows: the factor of the denoised light; in mirrors and glass,
-                                       // Scratch::seen, if nothing moves a mean over frames
-    surface_guide = albedo_guide + 3,  // an int's bits: number of the surface (surface_of() in guides.inl); 0: none;
-                                       // unchanged_surface: the other guides and the light are not set
-    guide_rows
-};
-
-// The denoised light of a surface: the radiance of a virtual one divided by its albedo, or the change of a catcher.
-enum LightRow : int {
-    variance_light = 3, // of the luminance of the three rows before; at first, whether it was sampled (`sampled`)
-    light_rows
-};
-
-// The memory of the denoiser: one value per cell of a layer.
-enum HistoryRow : int {
-    moment_history = 3, // two rows: means of the luminance of the light and of its square; the light precedes
-    distance_history = moment_history + 2, // mm, from the camera to the surface
-    normal_history,                        // an int's bits: packed_normal()
-    surface_history,                       // as surface_guide
-    frames_history,                        // number of frames in the means
-    seen_history,                          // three rows: albedo_guide of mirrors and glass
-    history_rows = seen_history + 3
-};
-
-// Sums over cells: the number of cells, and the difference between the luminance of the light in this frame and its
-// mean before.
-struct Change {
-    float count, sum, squares;
-};
-
-enum class LayerLight : std::int32_t {
-    objects, // radiance of virtual objects
-    change,  // change of the diffuse light of catchers
-    gloss    // light that glossy catchers mirror, minus what they mirror without virtual objects
-};
-
-// A grid of the denoiser. Histories have rows of `stride` values, a multiple of 16. Guides and light have `margin`
-// more values on both sides of a row, without a surface.
-struct Layer {
-    static constexpr std::int32_t margin = 16;
-    LayerLight holds;
-    std::int32_t cell_px;               // side of a cell
-    std::int32_t width, height, stride; // cells
-    // Each cell gets light in one of four frames, except of surfaces that are sampled in every frame.
-    bool takes_turns;
-    float *guides[guide_rows];
-    float *light[2][light_rows];       // each step of the filter reads one and writes the other
-    const float *before[history_rows]; // of the previous frame; NULL: there is none
-    float *after[history_rows];
-    static constexpr std::int32_t change_side = 8;
-    Change *changes; // of squares of change_side cells
-    std::int32_t changes_per_row() const { return stride / change_side; }
-    bool keeps_seen; // in seen_history
-    int history_count() const { return keeps_seen ? history_rows : seen_history; }
-    std::int32_t guide_stride() const { return stride + 2 * margin; }
-    // Of the filter. Those of larger cells begin with wider steps.
-    int filter_passes() const { return cell_px == 1 ? 5 : 4; }
-};
-
-struct Denoising {
-    static constexpr std::size_t most_objects = most_surfaces / 4 - 2;
-    static constexpr float most_frames = 32; // that count in the means
-    // The light of virtual objects in each pixel, and that of catchers; if no lamp casts sharp shadows, in cells of
-    // 2×2 pixels. The guides of `objects` are also those of catchers, except of the flat one. `gloss` exists only if
-    // the scene has glossy catchers; it shares the guides of `catchers`, whose albedo is their diffuse light without
-    // virtual objects (matt_row).
-    Layer objects, catchers, gloss;
-    unsigned *taps; // of pixels at edges: see tap_count in denoise.inl
-    Camera camera_before;
-    bool camera_moved, objects_moved;
-    float pixel_angle;         // width of a pixel in the middle of the image, in units of its distance
-    bool finds_change;         // whether to look for light that has changed
-    std::int32_t flat_surface; // number of that of PathScene::wide_catcher; 0: there is none
-    // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels. Likewise the
-    // virtual objects; but mirrors and glass, whose history is short, always at all pixels.
-    std::int32_t catcher_phase, object_phase;
-    std::uint32_t number;               // of the frame, without gaps
-    std::uint32_t first_random_in_turn; // as Frame::first_random, of pixels that are sampled in every fourth frame
-    // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
-    // axes. NULL if no placement has changed.
-    const float *before_from_now;
-    // Whether what curved mirrors and glass show may move over them.
-    bool seen_moves() const { return camera_moved || objects_moved; }
-};
-
-// The content of an image: values of the option `show`, in the order of plugin.cpp.
-enum class View : std::int32_t { picture, shadow, bounce, caustics, history, variance, normals };
-
 struct Frame {
     Scene scene;
     Rays rays;
     Camera camera;
-    const arhost::raytracer_common::Sample *samples;
+    const Sample *samples;
     std::int32_t sample_count;
     std::uint32_t first_sample; // number of samples accumulated before this frame; offset into the random sequences
     // Sums of accumulated samples, like Scratch::sum but for all tiles; NULL: no accumulation.
     float *history[sum_rows];
     std::int32_t light_samples; // samples per shaded point of each area light, the environment and the background
     bool single_path;           // glass spawns one random ray instead of two
-    std::uint8_t *rgba;         // NULL if the image is linear (arhost_image)
-    std::uint32_t stride;
-    std::uint16_t *linear;
+    Image image;
     std::uint32_t first_random; // offset into the random sequences of the path integrator
     PathScene path;
     const Denoising *denoising;       // NULL: off
     const Surroundings *surroundings; // NULL: the video before is not known
     View view;                        // the picture if `denoising` is NULL
-    bool blends_codes; // straight images of the path integrator: the host blends sRGB codes, not linear light
     // Called on any thread after each sample of a tile and before each chunk of photons, because a tile may take
     // seconds. Reports progress; returns whether the image is still wanted.
     bool (*goes_on)(const void *progress);
     const void *progress;
-};
-
-struct Rectangle {
-    std::int32_t x0, y0, x1, y1; // px; x1 and y1 are exclusive
 };
 
 struct Tile {
@@ -433,26 +300,19 @@ using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &
 // Traces the photons with the numbers from `first` on. `to`, `faces`: one element per photon. The face of a photon is
 // virtual_face if it arrived at a virtual surface. At a real one, it is 2 · axis of about the largest component of
 // the normal, plus 1 if this component is positive.
-using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint32_t count,
-                              arhost::raytracer_common::Photon *to, std::int8_t *faces);
+using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint32_t count, Photon *to,
+                              std::int8_t *faces);
 
-// A step of the denoiser on one row of a layer, or on one tile. `pass`: of the filter.
-using DenoiseRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row);
-using FilterRow = void (*)(const Frame &frame, const Layer &layer, std::int32_t row, int pass);
-using DenoiseTile = void (*)(const Frame &frame, const Tile &tile);
 // Updates a row of Frame::surroundings.
 using RememberRow = void (*)(const Frame &frame, std::int32_t row);
-// Writes a row of the image. Returns the bounding rectangle of the pixels that virtual objects affect.
-using ResolveRow = Rectangle (*)(const Frame &frame, std::int32_t row);
+// Finds the taps of the denoiser in a tile.
+using FindTaps = void (*)(const Frame &frame, const Tile &tile);
 
 struct Kernel {
     RenderTile render_tile, render_path_tile;
     TracePhotons trace_photons;
     RememberRow remember_row;
-    DenoiseRow find_change, accumulate_row;
-    FilterRow filter_row;
-    DenoiseTile find_taps;
-    ResolveRow resolve_row;
+    FindTaps find_taps;
     const char *name;
 };
 

@@ -38,7 +38,7 @@ public:
         else
             settings_.max_radiance = std::numeric_limits<float>::infinity();
         settings_.instruction_set = options.text("instruction_set");
-        choose_kernel(settings_.instruction_set); // throws now rather than in start() if unsupported
+        choose_instruction_set(settings_.instruction_set); // throws now rather than in start() if unsupported
     }
 
     void start(const arhost_raytracer_setup &setup) {
@@ -109,7 +109,6 @@ private:
 };
 
 constexpr const char *glass[] = {"tree", "path", nullptr};
-constexpr const char *instruction_sets[] = {"auto", "avx512", "avx2", "base", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_TEXT, "quality", "realtime",

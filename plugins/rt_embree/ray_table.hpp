@@ -4,7 +4,7 @@
 #pragma once
 
 #include "kernel.hpp"
-#include "thread_pool.hpp"
+#include "raytracer_common/thread_pool.hpp"
 
 #include <arhost/camera.h>
 #include <arhost/shading/lens.hpp>

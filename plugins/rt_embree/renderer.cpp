@@ -72,6 +72,19 @@ Rectangle united(const Rectangle &a, const Rectangle &b) {
     return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
 }
 
+Kernel kernel_of(InstructionSet instructions) {
+    switch (instructions) {
+#if defined(__x86_64__)
+    case InstructionSet::avx512:
+        return avx512::kernel();
+    case InstructionSet::avx2:
+        return avx2::kernel();
+#endif
+    default:
+        return base::kernel();
+    }
+}
+
 // Whether there are virtual mirrors or glass objects.
 bool has_specular(const EmbreeScene &scene) {
     return std::ranges::any_of(std::span(scene.view().objects, scene.placed_objects().size()),
@@ -83,22 +96,6 @@ bool has_specular(const EmbreeScene &scene) {
 }
 
 } // namespace
-
-Kernel choose_kernel(const std::string &instruction_set) {
-    const auto requested = [&](const char *name) { return instruction_set == name || instruction_set == "auto"; };
-#if defined(__x86_64__)
-    if (requested("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
-        return avx512::kernel();
-    if (requested("avx2") && __builtin_cpu_supports("avx2"))
-        return avx2::kernel();
-#endif
-    if (requested("base"))
-        return base::kernel();
-    throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                  "option 'instruction_set': this processor or this build of rt_embree does not support '" +
-                      instruction_set + "'; use 'auto'");
-}
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     // The first queue holds up to two rays per pixel, because glass reflects and refracts, and glossy catchers
@@ -133,7 +130,8 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
     : host_(host), full_intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
-      intrinsics_(full_intrinsics_), kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
+      intrinsics_(full_intrinsics_), kernel_(kernel_of(choose_instruction_set(settings.instruction_set))),
+      threads_(settings.threads),
       ray_table_(intrinsics_,
                  settings.samples > 1 || settings.accumulate || setup.scene->integrator == ARHOST_INTEGRATOR_PATH,
                  threads_),
@@ -153,7 +151,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         place_lights();
     }
     if (settings.denoise && lights_ && setup.scene->objects.count <= Denoising::most_objects)
-        denoiser_.emplace(full_intrinsics_.width, full_intrinsics_.height, setup.scene->objects.count,
+        denoiser_.emplace(choose_instruction_set(settings.instruction_set), full_intrinsics_.width,
+                          full_intrinsics_.height, setup.scene->objects.count,
                           DenoisedScene{.has_sharp_shadows = lights_->casts_sharp_shadows(),
                                         .has_gloss = scene_.view().has_gloss,
                                         .has_specular = has_specular(scene_)});
@@ -305,6 +304,7 @@ PathScene Renderer::path_scene() const {
     path.least_irradiance = lights_->least_irradiance(has_video_ ? &video_ : nullptr);
     const arhost_intrinsics &of = full_intrinsics_;
     path.brightest_texel = brightest_texel_;
+    path.video.linear_of_srgb8 = scene_.view().linear_of_srgb8;
     path.video.image = {has_video_ ? video_.texels() : nullptr,
                         static_cast<std::int32_t>(of.width),
                         static_cast<std::int32_t>(of.height),
@@ -368,15 +368,12 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 {},
                 light_samples_,
                 single_path_,
-                image.rgba,
-                image.stride,
-                image.linear,
+                {image.rgba, image.stride, image.linear, blends_codes_, scene_.view().srgb8},
                 first_random,
                 path_scene(),
                 nullptr,
                 nullptr,
                 View::picture,
-                blends_codes_,
                 [](const void *of) { return static_cast<const Progress *>(of)->goes_on(); },
                 &progress};
     if (!history_.empty())
@@ -384,9 +381,18 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
     if (denoiser_ && state.after) {
         frame.view = view_;
-        frame.denoising = &denoiser_->begin(
-            state, intrinsics_, frame.camera, scene_.placed_objects(), motion && motion->deformed_count > 0,
-            static_cast<std::uint32_t>(sequence), full_samples_, windows.wide_catcher(), shading_px);
+        frame.denoising = &denoiser_->begin(state, {.intrinsics = intrinsics_,
+                                                    .camera = frame.camera,
+                                                    .video = frame.path.video,
+                                                    .image = frame.image,
+                                                    .view = view_,
+                                                    .objects = scene_.placed_objects(),
+                                                    .deforms = motion && motion->deformed_count > 0,
+                                                    .sequence = static_cast<std::uint32_t>(sequence),
+                                                    .samples = full_samples_,
+                                                    .flat_catcher = windows.wide_catcher(),
+                                                    .takes_turns = true,
+                                                    .shading_px = shading_px});
     }
     std::optional<Surroundings> surroundings;
     if (frame.denoising && remembers_) {
@@ -409,7 +415,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         const Tile &tile = tiles[i];
         const Window &window = ray_table_.window(i);
         if (!windows.may_affect(window) || host_.cancelled())
-            return frame.denoising ? denoiser_->clear(tile) : clear(image, tile.pixels);
+            return frame.denoising ? denoiser_->clear(tile.pixels) : clear(image, tile.pixels);
         Scratch &scratch = *scratch_[thread];
         windows.select(window, scratch);
         const Rectangle part = render_tile(frame, tile, scratch);
@@ -424,7 +430,11 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while tracing the image");
     }
     if (frame.denoising) {
-        drawn = denoiser_->run(frame, kernel_, tiles, threads_);
+        threads_.for_each(tiles.size(), [&](std::size_t i, std::size_t) {
+            if (frame.goes_on(frame.progress))
+                kernel_.find_taps(frame, tiles[i]);
+        });
+        drawn = denoiser_->run(threads_);
         if (host_.cancelled())
             throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while denoising the image");
         return drawn;

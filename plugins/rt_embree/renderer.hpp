@@ -3,14 +3,14 @@
 // Renders an image: selects the tiles in which objects can be visible, and distributes them over threads.
 #pragma once
 
-#include "denoiser.hpp"
 #include "embree_scene.hpp"
 #include "photon_sums.hpp"
 #include "ray_table.hpp"
+#include "raytracer_common/denoiser/denoiser.hpp"
 #include "raytracer_common/photon_map.hpp"
+#include "raytracer_common/thread_pool.hpp"
 #include "raytracer_common/video.hpp"
 #include "surroundings.hpp"
-#include "thread_pool.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -118,9 +118,5 @@ private:
     std::uint32_t history_samples_ = 0;           // number of samples in the sums
     std::optional<arhost_camera> history_camera_; // the camera of the sums; empty: the sums are invalid
 };
-
-// Returns the kernel for `instruction_set`; "auto" selects the one with the widest registers that this processor
-// supports. Throws Failure if the processor or this build does not support `instruction_set`.
-Kernel choose_kernel(const std::string &instruction_set);
 
 } // namespace rt_embree

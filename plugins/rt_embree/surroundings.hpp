@@ -3,8 +3,8 @@
 // The memory of the video, in the state that the host keeps.
 #pragma once
 
-#include "denoiser.hpp"
 #include "embree_scene.hpp"
+#include "raytracer_common/denoiser/denoiser.hpp"
 
 #include <cstdint>
 

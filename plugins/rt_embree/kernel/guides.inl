@@ -4,9 +4,9 @@
 #pragma once
 #include "path_catcher.inl"
 
-// Returns the numbers of the surfaces hit (surface_number()). Where a specular surface shows another one,
-// store_seen() adds mirrored_unit · (index of the latter + 1).
-constexpr int mirrored_unit = most_surfaces;
+#include "raytracer_common/denoiser/layers.inl"
+
+// Returns the numbers of the surfaces hit (surface_number()).
 ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool active) {
     Int kinds(0);
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
@@ -23,13 +23,6 @@ ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool activ
     });
     return (((object_number(scene, hit) + Int(1)) << Int(2)) & Int(mirrored_unit - 1)) | kinds;
 }
-ARHOST_INLINE Int object_of_surface(Int surface) {
-    return ((surface & Int(mirrored_unit - 1)) >> Int(2)) - Int(1);
-}
-ARHOST_INLINE Bool is_kind(Int surface, SurfaceKind kind) {
-    return (surface & Int(3)) == Int(kind);
-}
-
 struct Guides {
     Vec3 position, normal, albedo;
     Int surface;

@@ -3,12 +3,16 @@
 // The integrator, which renders a tile in blocks of 4×4 pixels. base.cpp, avx2.cpp and avx512.cpp each define
 // ARHOST_ISA and include this file.
 #include "kernel.hpp"
-#include "packet.hpp"
+
+#include "raytracer_common/packets/packet.hpp"
 
 #define ARHOST_TEXT_OF(token) #token
 #define ARHOST_TEXT(macro) ARHOST_TEXT_OF(macro)
 
 namespace rt_embree::ARHOST_ISA {
+
+using namespace arhost::raytracer_common::ARHOST_ISA;
+
 namespace {
 
 // Included inside the namespace so that each instruction set has its own copy of the functions.
@@ -52,18 +56,6 @@ ARHOST_INLINE Vec3 direction_in_camera(const Frame &frame, const float *rays, fl
 }
 ARHOST_INLINE Vec3 direction_in_world(const Frame &frame, const float *rays, float x, float y) {
     return transform(frame.camera.world_from_camera, direction_in_camera(frame, rays, x, y));
-}
-
-ARHOST_INLINE Int srgb8(const arhost::shading::Srgb8Table &table, Float linear) {
-    using Table = arhost::shading::Srgb8Table;
-    const Int bits = bits_of(min(max(linear, Float(Table::smallest)), Float(1.0f)));
-    const Int cell = gather(table.cells, (bits - Int(Table::first_bits)) >> Int(Table::shift));
-    const Bool above = (bits & Int(Table::low_mask)) >= (cell & Int(Table::threshold_mask));
-    return (cell >> Int(Table::code_shift)) + select(above, Int(1), Int(0));
-}
-
-ARHOST_INLINE Int rgba8(Int r, Int g, Int b, Int a) {
-    return r | (g << Int(8)) | (b << Int(16)) | (a << Int(24));
 }
 
 // Adds the radiance of the current sample to the pixels' sums. Radiance is averaged in linear light and encoded only
@@ -124,9 +116,9 @@ ARHOST_INLINE Int mean(const Frame &frame, const Scratch &scratch, int first_pix
         light.x = load(scratch.sum[light_row] + first_pixel) * per_hit;
         light.y = load(scratch.sum[light_row + 1] + first_pixel) * per_hit;
         light.z = load(scratch.sum[light_row + 2] + first_pixel) * per_hit;
-        red = srgb8(*scene.srgb8, light.x);
-        green = srgb8(*scene.srgb8, light.y);
-        blue = srgb8(*scene.srgb8, light.z);
+        red = srgb8(*frame.image.srgb8, light.x);
+        green = srgb8(*frame.image.srgb8, light.y);
+        blue = srgb8(*frame.image.srgb8, light.z);
     }
     Float alpha = coverage;
     if (scene.has_catchers) {
@@ -154,7 +146,7 @@ ARHOST_INLINE Int mean(const Frame &frame, const Scratch &scratch, int first_pix
 ARHOST_INLINE void write_block(const Frame &frame, int x, int y, int width, int height, Int pixels) {
     const auto *from = reinterpret_cast<const std::uint8_t *>(&pixels);
     for (int row = 0; row < height; ++row) {
-        std::uint8_t *to = frame.rgba + std::size_t{frame.stride} * (y + row) + std::size_t{4} * x;
+        std::uint8_t *to = frame.image.rgba + std::size_t{frame.image.stride} * (y + row) + std::size_t{4} * x;
         if (width == block)
             __builtin_memcpy(to, from + 4 * block * row, 4 * block);
         else
@@ -171,7 +163,7 @@ template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use
             use(index, x, y, all.x1 - x < block ? all.x1 - x : block, all.y1 - y < block ? all.y1 - y : block);
 }
 
-#include "denoise.inl"
+#include "denoiser_input.inl"
 #include "region.inl"
 #include "specular_edges.inl"
 
@@ -212,9 +204,9 @@ struct Path {
             return false;
         }
         const LinearBlock linear = linear_mean(frame, scratch, first_pixel, count, x, y);
-        if (frame.linear)
-            return write_linear(frame, x, y, width, height, linear);
-        const Int pixels = straight_of(frame, linear);
+        if (frame.image.linear)
+            return write_linear(frame.image, x, y, width, height, linear);
+        const Int pixels = straight_of(frame.image, linear);
         write_block(frame, x, y, width, height, pixels);
         return any((pixels >> Int(24)) != Int(0));
     }
@@ -292,8 +284,7 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     return drawn;
 }
 
-void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, arhost::raytracer_common::Photon *to,
-                   std::int8_t *faces) {
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count, Photon *to, std::int8_t *faces) {
     for (std::uint32_t i = 0; i < count; i += lanes)
         trace_photon_packet(frame, first + i, to + i, faces + i, lane_numbers() < Int(static_cast<int>(count - i)));
 }
@@ -301,8 +292,7 @@ void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
 } // namespace
 
 Kernel kernel() {
-    return {render<Whitted>, render<Path>, trace_photons, remember, find_change,
-            accumulate,      filter,       find_taps,     resolve,  ARHOST_TEXT(ARHOST_ISA)};
+    return {render<Whitted>, render<Path>, trace_photons, remember, find_taps, ARHOST_TEXT(ARHOST_ISA)};
 }
 
 } // namespace rt_embree::ARHOST_ISA

@@ -230,7 +230,8 @@ ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction,
     if (environment.image) {
         const Vec3 d = transform(environment.environment_from_world, direction);
         const Float u = equirectangular_u(d), v = equirectangular_v(d);
-        light = sample_texture(frame.scene, *environment.image, u, v).colour * splat(environment.intensity);
+        light = sample_texture(frame.scene.linear_of_srgb8, *environment.image, u, v).colour *
+                splat(environment.intensity);
         if (is_random)
             density = environment_density_at(environment, u, v);
     }
@@ -266,7 +267,7 @@ ARHOST_INLINE LightSample sample_environment(const Scene &scene, const Surface &
     const float *m = environment.environment_from_world;
     const Vec3 to_light{dot(splat(m), d), dot(splat(m + 3), d), dot(splat(m + 6), d)};
     const Float density = environment_density(image, row_step.v, column_step.v, v);
-    const Vec3 light = sample_texture(scene, image, u, v).colour * splat(environment.intensity);
+    const Vec3 light = sample_texture(scene.linear_of_srgb8, image, u, v).colour * splat(environment.intensity);
     LightSample sample = make_light_sample(s, to_light, far_away, light);
     sample.irradiance = irradiance_of_density(density);
     sample.sampling_density = density * Float(static_cast<float>(count));

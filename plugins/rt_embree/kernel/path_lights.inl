@@ -6,8 +6,6 @@
 #include "path_materials.inl"
 #include "path_random.inl"
 
-using namespace arhost::raytracer_common; // SourceRow, SourceType
-
 // Number of light samples at a vertex of a path.
 ARHOST_INLINE int source_samples(const Frame &frame, std::uint32_t depth) {
     return depth == 0 ? frame.light_samples : 1;
@@ -27,7 +25,8 @@ ARHOST_INLINE Vec3 environment_light(const Frame &frame, Vec3 direction) {
     if (!environment.image)
         return splat(frame.scene.background);
     const Vec3 d = transform(environment.environment_from_world, direction);
-    return sample_texture(frame.scene, *environment.image, equirectangular_u(d), equirectangular_v(d)).colour *
+    return sample_texture(frame.scene.linear_of_srgb8, *environment.image, equirectangular_u(d), equirectangular_v(d))
+               .colour *
            splat(environment.intensity);
 }
 
@@ -254,7 +253,8 @@ ARHOST_INLINE Vec3 irradiance_without_objects(const Frame &frame, const Surface 
     Vec3 sum = splat(scene.background);
     if (scene.environment.image) {
         const Vec3 d = transform(scene.environment.environment_from_world, s.normal);
-        sum = sample_texture(scene, frame.path.irradiance, equirectangular_u(d), equirectangular_v(d)).colour *
+        sum = sample_texture(scene.linear_of_srgb8, frame.path.irradiance, equirectangular_u(d), equirectangular_v(d))
+                  .colour *
               splat(scene.environment.intensity);
     }
     for (std::uint32_t i = 0; i < scene.light_count; ++i) {

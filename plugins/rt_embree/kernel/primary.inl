@@ -4,16 +4,11 @@
 #pragma once
 #include "scatter.inl"
 
-constexpr int block = 4; // side of a block, px
+#include "raytracer_common/packets/image.inl"
 
 ARHOST_INLINE void add_to_sum(Scratch &scratch, int row, int first_pixel, Float more) {
     float *to = scratch.sum[row] + first_pixel;
     store(to, load(to) + more);
-}
-
-// Returns the lanes of a block whose pixels are inside the image.
-ARHOST_INLINE Bool inside_block(int width, int height) {
-    return ((lane_numbers() & Int(block - 1)) < Int(width)) & ((lane_numbers() >> Int(2)) < Int(height));
 }
 
 // Returns the lanes whose rays pass through one of the windows. `direction`: in camera axes, with z = 1.

@@ -80,7 +80,8 @@ ARHOST_INLINE Bool may_change(const Frame &frame, const Surface &s, Float reach)
     Float brightness(1.0f);
     if (scene.environment.image) {
         const Vec3 d = transform(scene.environment.environment_from_world, s.normal);
-        const Vec3 mean = sample_texture(scene, path.irradiance, equirectangular_u(d), equirectangular_v(d)).colour;
+        const Vec3 mean =
+            sample_texture(scene.linear_of_srgb8, path.irradiance, equirectangular_u(d), equirectangular_v(d)).colour;
         brightness = max(Float(path.brightest_texel) / max(luminance(mean), Float(1e-6f)), brightness);
     }
     return changes | (form_factors * brightness >= Float(least_visible_form_factor));

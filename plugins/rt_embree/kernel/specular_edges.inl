@@ -3,7 +3,7 @@
 // Edges of what mirrors and glass show. The denoiser keeps them sharp, so they would be jagged: pixels there get more
 // samples.
 #pragma once
-#include "denoise.inl"
+#include "denoiser_input.inl"
 
 // The surfaces and the light that the pixels of a tile show, with a margin of one pixel.
 struct TileSurfaces {

@@ -2,7 +2,9 @@
 //
 // Computes what shading needs to know about the surfaces that a packet of rays hits.
 #pragma once
-#include "texture.inl"
+#include "trace.inl"
+
+#include "raytracer_common/packets/texture.inl"
 
 struct Surface {
     Vec3 position;
@@ -55,7 +57,7 @@ ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &obje
         u = u + gather(object.texcoords, at) * corners.weight[i];
         v = v + gather(object.texcoords + 1, at) * corners.weight[i];
     }
-    return sample_texture(scene, scene.textures[texture], u, v);
+    return sample_texture(scene.linear_of_srgb8, scene.textures[texture], u, v);
 }
 
 // Returns `normal`, perturbed by the object's normal map. `facet` is the geometric normal. The tangents are constant

@@ -2,29 +2,9 @@
 //
 // Ray packets and their hits.
 #pragma once
+#include "raytracer_common/packets/vectors.inl"
 
-constexpr float far_away = __builtin_inff();
 constexpr int no_hit = static_cast<int>(RTC_INVALID_GEOMETRY_ID);
-
-ARHOST_INLINE Vec3 splat(const float *xyz) {
-    return {Float(xyz[0]), Float(xyz[1]), Float(xyz[2])};
-}
-ARHOST_INLINE Vec3 black() {
-    return {Float(0.0f), Float(0.0f), Float(0.0f)};
-}
-ARHOST_INLINE Vec3 white() {
-    return {Float(1.0f), Float(1.0f), Float(1.0f)};
-}
-
-ARHOST_INLINE Int lane_numbers() {
-    alignas(64) constexpr int numbers[lanes] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    return load(numbers);
-}
-
-// Returns m · a, where `m` is a column-major 3×3 matrix.
-ARHOST_INLINE Vec3 transform(const float *m, Vec3 a) {
-    return splat(m) * a.x + splat(m + 3) * a.y + splat(m + 6) * a.z;
-}
 
 template <class Ray> ARHOST_INLINE void set_ray(Ray &ray, Vec3 origin, Vec3 direction, Float end, Int mask) {
     store(ray.org_x, origin.x);

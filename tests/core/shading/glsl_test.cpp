@@ -133,7 +133,7 @@ TEST(LeafFiles, HaveNoBranches) {
 TEST(LeafFiles, AreAllIncludedByEveryImplementation) {
     for (const auto &path :
          {shading / "scalar.hpp", shading / "glsl.h",
-          std::filesystem::path(arhost::test::source_directory() + "/plugins/rt_embree/kernel/packet.hpp")})
+          std::filesystem::path(arhost::test::source_directory() + "/plugins/raytracer_common/packets/packet.hpp")})
         for (const auto &[name, code] : leaf_files())
             EXPECT_NE(contents(path).find("leaf/" + name), std::string::npos) << path << " lacks " << name;
 }

@@ -3,8 +3,8 @@
 // arhost/shading/scalar.hpp: compiles the functions of leaf/*.h for scalars.
 //
 // A leaf file is written in the common subset of C++ and GLSL, without branches or an include guard, so that scalars
-// (here), SIMD packets (plugins/rt_embree/kernel/packet.hpp) and shaders (glsl.h) share the formulas. It must be
-// included in a namespace that defines
+// (here), SIMD packets (plugins/raytracer_common/packets/packet.hpp) and shaders (glsl.h) share the formulas. It must
+// be included in a namespace that defines
 //   ARHOST_LEAF            function prefix: "inline", or nothing in GLSL
 //   Float, Bool, Vec3      a number, the result of a comparison, three numbers; for one SIMD lane or many
 //   vec3(x, y, z), select(b, yes, no) of Float and of Vec3

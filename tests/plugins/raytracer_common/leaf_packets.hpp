@@ -4,7 +4,7 @@
 // versions. Each namespace has the call_leaf that is compiled for one instruction set, like the kernel.
 #pragma once
 
-namespace rt_embree {
+namespace arhost::raytracer_common {
 
 constexpr int packet_lanes = 16, max_arguments = 16, max_results = 3;
 struct alignas(64) Packet {
@@ -24,4 +24,4 @@ namespace avx512 {
 void call_leaf(int number, const Packet (&arguments)[max_arguments], Packet (&results)[max_results]);
 }
 
-} // namespace rt_embree
+} // namespace arhost::raytracer_common

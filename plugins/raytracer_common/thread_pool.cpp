@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "thread_pool.hpp"
+#include "raytracer_common/thread_pool.hpp"
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 #include <immintrin.h>
 #endif
 
-namespace rt_embree {
+namespace arhost::raytracer_common {
 
 #if defined(__SSE2__)
 // 0x8040 sets the bits flush-to-zero and denormals-are-zero (Intel SDM vol. 1, 10.2.3).
@@ -66,4 +66,4 @@ void ThreadPool::run_items(std::size_t thread) {
         (*work_)(i, thread);
 }
 
-} // namespace rt_embree
+} // namespace arhost::raytracer_common

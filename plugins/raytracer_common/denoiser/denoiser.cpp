@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "denoiser.hpp"
+#include "raytracer_common/denoiser/denoiser.hpp"
 
 #include "raytracer_common/scene_geometry.hpp"
 
@@ -11,7 +11,7 @@
 #include <mutex>
 #include <utility>
 
-namespace rt_embree {
+namespace arhost::raytracer_common {
 namespace {
 
 // The state begins with this, followed by the objects and the rows of the history.
@@ -69,7 +69,7 @@ std::size_t size_of(std::uint32_t width, std::uint32_t height, std::size_t objec
 
 // Writes to · inverse(from): the motion from one placement to another.
 void write_motion(const float *from, const float *to, float *motion) {
-    const arhost::raytracer_common::Cofactors cofactors(from);
+    const Cofactors cofactors(from);
     double linear[9]; // column-major
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) {
@@ -89,9 +89,23 @@ void write_motion(const float *from, const float *to, float *motion) {
 
 } // namespace
 
-Denoiser::Denoiser(std::uint32_t width, std::uint32_t height, std::size_t objects, const DenoisedScene &scene)
-    : objects_(objects), has_gloss_(scene.has_gloss), has_specular_(scene.has_specular),
-      catcher_cell_px_(scene.has_sharp_shadows || scene.has_gloss ? 1 : 2),
+Steps steps_of(InstructionSet instructions) {
+    switch (instructions) {
+#if defined(__x86_64__)
+    case InstructionSet::avx512:
+        return avx512::steps();
+    case InstructionSet::avx2:
+        return avx2::steps();
+#endif
+    default:
+        return base::steps();
+    }
+}
+
+Denoiser::Denoiser(InstructionSet instructions, std::uint32_t width, std::uint32_t height, std::size_t objects,
+                   const DenoisedScene &scene)
+    : steps_(steps_of(instructions)), objects_(objects), has_gloss_(scene.has_gloss),
+      has_specular_(scene.has_specular), catcher_cell_px_(scene.has_sharp_shadows || scene.has_gloss ? 1 : 2),
       state_size_(size_of(width, height, objects, catcher_cell_px_, scene)), motion_(12 * objects) {}
 
 std::vector<Layer *> Denoiser::layers() {
@@ -134,16 +148,15 @@ void Denoiser::resize(std::uint32_t width, std::uint32_t height) {
     denoising_.taps = taps_.data();
 }
 
-const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsics &intrinsics, const Camera &camera,
-                                 std::span<const arhost::raytracer_common::PlacedObject> objects, bool deforms,
-                                 std::uint32_t sequence, std::uint32_t samples, std::int32_t flat_catcher,
-                                 std::uint32_t shading_px) {
+const Denoising &Denoiser::begin(const StateSlots &slots, const NewFrame &frame) {
+    const arhost_intrinsics &intrinsics = frame.intrinsics;
     if (static_cast<std::uint32_t>(denoising_.objects.width) != intrinsics.width ||
         static_cast<std::uint32_t>(denoising_.objects.height) != intrinsics.height)
         resize(intrinsics.width, intrinsics.height);
     auto *state = static_cast<std::byte *>(slots.after);
     std::memset(state, 0, rows_offset(objects_));
-    StateHeader header{state_version, intrinsics.width, intrinsics.height, sequence, 0, sequence, 0, camera},
+    StateHeader header{state_version, intrinsics.width, intrinsics.height, frame.sequence, 0, frame.sequence, 0,
+                       frame.camera},
         earlier{};
     const auto *before = static_cast<const std::byte *>(slots.before);
     if (before)
@@ -151,15 +164,15 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     if (earlier.version != state_version || earlier.width != header.width || earlier.height != header.height)
         before = nullptr;
     auto *now = reinterpret_cast<ObjectState *>(state + sizeof header);
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-        std::copy_n(objects[i].world_from_object, 12, now[i].world_from_object);
-        now[i].is_visible = objects[i].is_visible;
+    for (std::size_t i = 0; i < frame.objects.size(); ++i) {
+        std::copy_n(frame.objects[i].world_from_object, 12, now[i].world_from_object);
+        now[i].is_visible = frame.objects[i].is_visible;
     }
     const auto *then = before ? reinterpret_cast<const ObjectState *>(before + sizeof header) : nullptr;
     if (then && std::memcmp(then, now, sizeof(ObjectState) * objects_) == 0)
         then = nullptr; // nothing has moved
-    const bool moves = then || deforms;
-    if (moves && before && static_cast<std::int32_t>(sequence - earlier.sequence) > long_gap)
+    const bool moves = then || frame.deforms;
+    if (moves && before && static_cast<std::int32_t>(frame.sequence - earlier.sequence) > long_gap)
         before = nullptr, then = nullptr;
     if (before)
         header.first = earlier.first, header.frames = earlier.frames + 1;
@@ -171,20 +184,26 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         }
     std::memset(state + next, 0, state_size_ - next); // of a smaller image
 
+    denoising_.has_gloss = has_gloss_;
+    denoising_.camera = frame.camera;
+    denoising_.video = frame.video;
+    denoising_.image = frame.image;
+    denoising_.view = frame.view;
     denoising_.before_from_now = nullptr;
     denoising_.camera_moved = false;
     denoising_.objects_moved = moves;
     denoising_.pixel_angle = static_cast<float>(1 / intrinsics.fx);
-    denoising_.flat_surface = flat_catcher < 0 ? 0 : surface_number(flat_catcher, real_surface);
+    denoising_.flat_surface = frame.flat_catcher < 0 ? 0 : surface_number(frame.flat_catcher, real_surface);
     // The numbers of frames may have gaps, such as three of four.
     constexpr std::array<std::int32_t, 4> phases{0, 3, 1, 2};
     denoising_.number = header.first + header.frames;
     const std::int32_t phase = phases[denoising_.number % 4];
-    denoising_.first_random_in_turn = (header.first + header.frames / 4) * samples;
+    denoising_.first_random_in_turn = (header.first + header.frames / 4) * frame.samples;
     if (before) {
         denoising_.camera_before = earlier.camera;
-        denoising_.camera_moved = !std::ranges::equal(earlier.camera.eye, camera.eye) ||
-                                  !std::ranges::equal(earlier.camera.world_from_camera, camera.world_from_camera);
+        denoising_.camera_moved =
+            !std::ranges::equal(earlier.camera.eye, frame.camera.eye) ||
+            !std::ranges::equal(earlier.camera.world_from_camera, frame.camera.world_from_camera);
     }
     if (then) {
         for (std::size_t i = 0; i < objects_; ++i)
@@ -198,11 +217,11 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
         header.frames_at_rest = frames_to_find_change;
     else if (!moves)
         header.frames_at_rest = std::min(earlier.frames_at_rest + 1, frames_to_find_change);
-    const bool is_coarse = shading_px > 1;
+    const bool is_coarse = frame.takes_turns && frame.shading_px > 1;
     const bool sharp_shadows_are_new =
         catcher_cell_px_ == 1 && (header.frames_at_rest == 0 || header.frames < frames_to_find_change);
     denoising_.object_phase = is_coarse ? phase : -1;
-    denoising_.catcher_phase = !has_gloss_ && (is_coarse || !sharp_shadows_are_new) ? phase : -1;
+    denoising_.catcher_phase = frame.takes_turns && !has_gloss_ && (is_coarse || !sharp_shadows_are_new) ? phase : -1;
     denoising_.objects.takes_turns = denoising_.object_phase >= 0;
     denoising_.catchers.takes_turns = denoising_.catcher_phase >= 0 && denoising_.catchers.cell_px == 1;
     denoising_.finds_change = header.frames_at_rest < frames_to_find_change;
@@ -212,17 +231,17 @@ const Denoising &Denoiser::begin(const StateSlots &slots, const arhost_intrinsic
     return denoising_;
 }
 
-void Denoiser::clear(const Tile &tile) {
+void Denoiser::clear(const Rectangle &pixels) {
     for (Layer *layer : {&denoising_.objects, &denoising_.catchers}) {
         const auto cell = [&](std::int32_t px) { return (px + layer->cell_px - 1) / layer->cell_px; };
-        for (std::int32_t y = cell(tile.pixels.y0); y < cell(tile.pixels.y1); ++y) {
+        for (std::int32_t y = cell(pixels.y0); y < cell(pixels.y1); ++y) {
             float *row = layer->guides[surface_guide] + std::ptrdiff_t{y} * layer->guide_stride() + Layer::margin;
-            std::fill(row + cell(tile.pixels.x0), row + cell(tile.pixels.x1), 0.0f);
+            std::fill(row + cell(pixels.x0), row + cell(pixels.x1), 0.0f);
         }
     }
 }
 
-Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<const Tile> tiles, ThreadPool &threads) {
+Rectangle Denoiser::run(ThreadPool &threads) {
     constexpr std::int32_t chunk = Layer::change_side; // rows; a square of Layer::changes has one thread
     const std::vector<Layer *> all = layers();
     // Calls step(layer, row) for all rows of the layers that have more than `pass` passes.
@@ -242,20 +261,17 @@ Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<cons
                 step(layer, row);
         });
     };
-    threads.for_each(tiles.size(), [&](std::size_t i, std::size_t) {
-        if (frame.goes_on(frame.progress))
-            kernel.find_taps(frame, tiles[i]);
-    });
     if (denoising_.finds_change)
-        for_each_row(0, [&](const Layer &layer, std::int32_t row) { kernel.find_change(frame, layer, row); });
-    for_each_row(0, [&](const Layer &layer, std::int32_t row) { kernel.accumulate_row(frame, layer, row); });
+        for_each_row(0, [&](const Layer &layer, std::int32_t row) { steps_.find_change(denoising_, layer, row); });
+    for_each_row(0, [&](const Layer &layer, std::int32_t row) { steps_.accumulate(denoising_, layer, row); });
     const int passes = denoising_.objects.filter_passes();
     for (int pass = 0; pass < passes; ++pass)
-        for_each_row(pass, [&](const Layer &layer, std::int32_t row) { kernel.filter_row(frame, layer, row, pass); });
+        for_each_row(pass,
+                     [&](const Layer &layer, std::int32_t row) { steps_.filter(denoising_, layer, row, pass); });
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex mutex;
     for_each_row(passes, [&](const Layer &, std::int32_t row) {
-        const Rectangle part = kernel.resolve_row(frame, row);
+        const Rectangle part = steps_.resolve(denoising_, row);
         if (part.x0 >= part.x1)
             return;
         const std::lock_guard lock(mutex);
@@ -265,4 +281,4 @@ Rectangle Denoiser::run(const Frame &frame, const Kernel &kernel, std::span<cons
     return drawn;
 }
 
-} // namespace rt_embree
+} // namespace arhost::raytracer_common

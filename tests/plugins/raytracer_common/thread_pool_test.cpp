@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "thread_pool.hpp"
+#include "raytracer_common/thread_pool.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace rt_embree {
+namespace arhost::raytracer_common {
 namespace {
 
 TEST(ThreadPool, ProcessesEachItemOncePerCall) {
@@ -42,4 +42,4 @@ TEST(ThreadPool, FlushesDenormalsOnlyWhileProcessing) {
 }
 
 } // namespace
-} // namespace rt_embree
+} // namespace arhost::raytracer_common

@@ -4,39 +4,19 @@
 // certain (C. Schied et al., Spatiotemporal Variance-Guided Filtering, HPG 2017). It denoises the light of the
 // surface at the centre of each pixel: of virtual objects, their radiance divided by their albedo; of catchers, the
 // change of their light. At edges, more rays find which surfaces a pixel shows, and the pixel gets the light of the
-// neighbours that show them.
-#pragma once
-#include "path.inl"
+// neighbours that show them. The ray tracers write the light, the guides and the rays at edges.
+//
+// base.cpp, avx2.cpp and avx512.cpp each define ARHOST_ISA and include this file.
+#include "raytracer_common/denoiser/steps.hpp"
 
-ARHOST_INLINE Vec3 load3(const float *const *rows, std::ptrdiff_t at) {
-    return {load(rows[0] + at), load(rows[1] + at), load(rows[2] + at)};
-}
-ARHOST_INLINE void store3(float *const *rows, std::ptrdiff_t at, Vec3 a) {
-    store(rows[0] + at, a.x);
-    store(rows[1] + at, a.y);
-    store(rows[2] + at, a.z);
-}
-ARHOST_INLINE Vec3 gather3(const float *const *rows, Int at) {
-    return {gather(rows[0], at), gather(rows[1], at), gather(rows[2], at)};
-}
+#include "raytracer_common/packets/packet.hpp"
 
-// Index of a cell in guides and light, and in histories.
-ARHOST_INLINE std::ptrdiff_t guide_at(const Layer &layer, int x, int y) {
-    return std::ptrdiff_t{y} * layer.guide_stride() + Layer::margin + x;
-}
-ARHOST_INLINE std::ptrdiff_t history_at(const Layer &layer, int x, int y) {
-    return std::ptrdiff_t{y} * layer.stride + x;
-}
-ARHOST_INLINE Int surfaces_at(const Layer &layer, std::ptrdiff_t at) {
-    return bits_of(load(layer.guides[surface_guide] + at));
-}
+namespace arhost::raytracer_common::ARHOST_ISA {
+namespace {
 
-// Returns the lanes whose surfaces have light in the layer.
-ARHOST_INLINE Bool has_light_in(const Layer &layer, Int surface) {
-    const Bool is_real = is_kind(surface, real_surface);
-    return layer.holds == LayerLight::objects ? ~is_real & (surface != Int(0))
-                                              : is_real & (surface != Int(unchanged_surface));
-}
+// Included inside the namespace so that each instruction set has its own copy of the functions.
+#include "raytracer_common/denoiser/layers.inl"
+#include "raytracer_common/packets/image.inl"
 
 // Normals with 10 bits per component.
 ARHOST_INLINE Int packed_normal(Vec3 n) {
@@ -52,176 +32,18 @@ ARHOST_INLINE Vec3 unpacked_normal(Int a) {
     return {value(a), value(a >> Int(10)), value(a >> Int(20))};
 }
 
-// Values of variance_light of light[0]: whether the light of a cell was sampled in this frame; if only because no
-// other cell nearby shows its surface, it counts at new surfaces only, since its random numbers are those of its
-// turn.
-constexpr float not_sampled = 0, sampled = 1, sampled_early = 2;
-
-// The cells of a layer that a block of pixels covers.
-struct BlockCells {
-    std::ptrdiff_t first; // index of guides and light
-    int width, height;
-};
-ARHOST_INLINE BlockCells cells_of(const Layer &layer, int x, int y, int width, int height) {
-    const int side = layer.cell_px;
-    return {guide_at(layer, x / side, y / side), (width + side - 1) / side, (height + side - 1) / side};
-}
-// `values`: block / cell_px per row.
-ARHOST_INLINE void write_cells(const Layer &layer, const BlockCells &cells, float *plane, const void *values) {
-    const int per_row = block / layer.cell_px;
-    for (int row = 0; row < cells.height; ++row) {
-        float *to = plane + cells.first + row * layer.guide_stride();
-        const float *from = static_cast<const float *>(values) + per_row * row;
-        if (cells.width == block) // sizes that the compiler knows
-            __builtin_memcpy(to, from, 4 * block);
-        else if (cells.width == block / 2)
-            __builtin_memcpy(to, from, 2 * block);
-        else
-            __builtin_memcpy(to, from, 4 * cells.width);
-    }
-}
-ARHOST_INLINE void write_surface(const Layer &layer, const BlockCells &cells, int surface) {
-    alignas(64) int values[lanes];
-    store(values, Int(surface));
-    write_cells(layer, cells, layer.guides[surface_guide], values);
-}
-
-// Marks the pixels of a block as unchanged.
-ARHOST_INLINE void write_unchanged(const Frame &frame, int x, int y, int width, int height) {
-    for (const Layer *layer : {&frame.denoising->objects, &frame.denoising->catchers})
-        write_surface(*layer, cells_of(*layer, x, y, width, height), unchanged_surface);
-}
-
-// Writes the guides and the mean light of the catchers of a block. A cell shows the catcher of its first pixel that
-// has one, so that it shows the same in each frame.
-ARHOST_INLINE void write_catchers(const Frame &frame, const Scratch &scratch, int first_pixel, Float scale, int x,
-                                  int y, int width, int height) {
-    const Denoising &denoising = *frame.denoising;
-    const Layer &layer = denoising.catchers;
-    const BlockCells cells = cells_of(layer, x, y, width, height);
-    const int phase = denoising.catcher_phase;
-    const float *surfaces = scratch.guide[surface_guide] + first_pixel;
-    const unsigned caught = mask_of(is_kind(bits_of(load(surfaces)), real_surface).lane);
-    if (caught == 0)
-        return write_surface(layer, cells, 0);
-    alignas(64) float values[lanes];
-    const auto write = [&](float *plane, Float row) __attribute__((always_inline)) {
-        store(values, row);
-        write_cells(layer, cells, plane, values);
-    };
-    if (layer.cell_px == 1) {
-        const Int all = bits_of(load(surfaces));
-        const Bool is_real = is_kind(all, real_surface);
-        for (int i = 0; i < albedo_guide; ++i)
-            write(layer.guides[i], load(scratch.guide[i] + first_pixel));
-        write(layer.guides[surface_guide], float_of(select(is_real, all, Int(0))));
-        for (int i = 0; i < 3; ++i) {
-            const Float change = load(scratch.sum[change_row + i] + first_pixel) * scale;
-            write(layer.light[0][i], select(is_real, change, Float(0.0f)));
-        }
-        const Bool is_sampled = (phase_of_lanes() == Int(phase)) | bool_of(phase < 0);
-        write(layer.light[0][variance_light], select(is_sampled, Float(sampled), Float(not_sampled)));
-        if (!frame.scene.has_gloss)
-            return;
-        for (int i = 0; i < 3; ++i) {
-            const auto mean = [&](int row) __attribute__((always_inline)) {
-                return load(scratch.sum[row + i] + first_pixel) * scale;
-            };
-            write(layer.guides[albedo_guide + i], mean(matt_row));
-            write(denoising.gloss.light[0][i], select(is_real, mean(light_row) - mean(covered_row), Float(0.0f)));
-        }
-        return write(denoising.gloss.light[0][variance_light], Float(sampled));
-    }
-    constexpr int cell_count = 4;
-    const auto pixel_of = [](int cell, int i) __attribute__((always_inline)) {
-        return 2 * block * (cell >> 1) + 2 * (cell & 1) + block * (i >> 1) + (i & 1);
-    };
-    alignas(64) int shown[lanes] = {}, is_empty[lanes] = {}, pixels[4][lanes] = {};
-    for (int cell = 0; cell < cell_count; ++cell) {
-        is_empty[cell] = -1;
-        for (int i = 0; i < 4; ++i) {
-            const int pixel = pixel_of(cell, i);
-            pixels[i][cell] = pixel;
-            if ((caught >> pixel & 1) != 0 && is_empty[cell] != 0) {
-                shown[cell] = pixel;
-                is_empty[cell] = 0;
-            }
-        }
-    }
-    const Bool exists = load(is_empty) == Int(0);
-    const Int pixel = load(shown), surface = select(exists, bits_of(pick(surfaces, pixel)), Int(0));
-    for (int i = 0; i < albedo_guide; ++i)
-        write(layer.guides[i], pick(scratch.guide[i] + first_pixel, pixel));
-    write(layer.guides[surface_guide], float_of(surface));
-    Vec3 light = black();
-    Float count(0.0f);
-    for (int i = 0; i < 4; ++i) {
-        if (phase >= 0 && i != phase)
-            continue;
-        const Int of = load(pixels[i]);
-        const Bool counts = exists & (bits_of(pick(surfaces, of)) == surface);
-        const auto change = [&](int row) __attribute__((always_inline)) {
-            return select(counts, pick(scratch.sum[change_row + row] + first_pixel, of), Float(0.0f));
-        };
-        light = light + Vec3{change(0), change(1), change(2)};
-        count = count + select(counts, Float(1.0f), Float(0.0f));
-    }
-    light = light * (scale / max(count, Float(1.0f)));
-    write(layer.light[0][0], light.x);
-    write(layer.light[0][1], light.y);
-    write(layer.light[0][2], light.z);
-    write(layer.light[0][variance_light], select(count > Float(0.0f), Float(sampled), Float(not_sampled)));
-}
-
-// Writes the guides and the light of a block. `count`: the number of samples.
-ARHOST_INLINE void write_for_denoiser(const Frame &frame, const Scratch &scratch, int first_pixel,
-                                      std::uint32_t count, int x, int y, int width, int height) {
-    const Denoising &denoising = *frame.denoising;
-    const Layer &layer = denoising.objects;
-    const Float scale(1.0f / static_cast<float>(count));
-    if (frame.scene.has_catchers)
-        write_catchers(frame, scratch, first_pixel, scale, x, y, width, height);
-    const BlockCells cells = cells_of(layer, x, y, width, height);
-    const auto guide = [&](int row) __attribute__((always_inline)) {
-        return load(scratch.guide[row] + first_pixel);
-    };
-    const Int surface = bits_of(guide(surface_guide));
-    write_cells(layer, cells, layer.guides[surface_guide], scratch.guide[surface_guide] + first_pixel);
-    if (!any(surface != Int(denoising.flat_surface)))
-        return;
-    for (int i = 0; i < albedo_guide; ++i)
-        write_cells(layer, cells, layer.guides[i], scratch.guide[i] + first_pixel);
-    alignas(64) float values[lanes];
-    const Bool is_virtual = has_light_in(layer, surface), is_specular = is_kind(surface, specular_surface);
-    const Float samples = load(scratch.sum[coverage_row] + first_pixel); // more at edges in mirrors
-    for (int i = 0; i < 3; ++i) {
-        const Float seen = max(load(scratch.seen[i] + first_pixel) / samples, Float(least_divisor));
-        const Float albedo = select(is_specular, seen, guide(albedo_guide + i));
-        store(values, albedo);
-        write_cells(layer, cells, layer.guides[albedo_guide + i], values);
-        const Float light = load(scratch.sum[light_row + i] + first_pixel) / (albedo * samples);
-        store(values, select(is_virtual, light, Float(0.0f)));
-        write_cells(layer, cells, layer.light[0][i], values);
-    }
-    const int phase = denoising.object_phase;
-    const Bool in_turn = is_specular | (phase_of_lanes() == Int(phase)) | bool_of(phase < 0);
-    const Bool is_sampled = objects_in_turn(frame, scratch, first_pixel);
-    store(values, select(in_turn, Float(sampled), select(is_sampled, Float(sampled_early), Float(not_sampled))));
-    write_cells(layer, cells, layer.light[0][variance_light], values);
-}
-
 // The pixel of an image that shows a point.
 struct Projected {
     Float x, y;     // px, pixel centres at integers
     Float distance; // mm, from the camera
     Bool inside;    // in front of the camera
 };
-ARHOST_INLINE Projected projected(const Frame &frame, const Camera &camera, Vec3 position) {
+ARHOST_INLINE Projected projected(const Denoising &denoising, const Camera &camera, Vec3 position) {
     const Vec3 to_point = position - splat(camera.eye);
-    const PixelOf pixel = pixel_towards(frame.path.video, camera, to_point);
+    const PixelOf pixel = pixel_towards(denoising.video, camera, to_point);
     // From texels of the video to pixels of the image.
-    const Texture &video = frame.path.video.image;
-    const Layer &pixels = frame.denoising->objects;
+    const Texture &video = denoising.video.image;
+    const Layer &pixels = denoising.objects;
     const float across = static_cast<float>(pixels.width) / static_cast<float>(video.width),
                 down = static_cast<float>(pixels.height) / static_cast<float>(video.height);
     return {pixel.x * Float(across) - Float(0.5f), pixel.y * Float(down) - Float(0.5f), length(to_point),
@@ -234,16 +56,15 @@ struct Past {
     Float moments[2], frames; // frames: 0 if the surface is new
 };
 // `x`, `row`: of the first cell.
-ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int row, Vec3 position, Vec3 normal,
+ARHOST_INLINE Past past_of(const Denoising &denoising, const Layer &layer, int x, int row, Vec3 position, Vec3 normal,
                            Int surface, Bool active) {
-    const Denoising &denoising = *frame.denoising;
     Past past{black(), black(), {Float(0.0f), Float(0.0f)}, Float(0.0f)};
     if (!layer.before[0])
         return past;
     // The point may be in any pixel of its cell. The cell moves as that point does.
     Projected now{};
     if (layer.cell_px > 1)
-        now = projected(frame, frame.camera, position);
+        now = projected(denoising, denoising.camera, position);
     if (denoising.before_from_now) {
         const Int first = object_of_surface(surface) * Int(12);
         const auto column = [&](int i) __attribute__((always_inline)) {
@@ -255,7 +76,7 @@ ARHOST_INLINE Past past_of(const Frame &frame, const Layer &layer, int x, int ro
         position = columns[0] * position.x + columns[1] * position.y + columns[2] * position.z + columns[3];
         normal = columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z;
     }
-    Projected at = projected(frame, denoising.camera_before, position);
+    Projected at = projected(denoising, denoising.camera_before, position);
     if (layer.cell_px > 1) {
         const Float per_pixel(1.0f / static_cast<float>(layer.cell_px));
         at.x = to_float(lane_numbers() + Int(x)) + (at.x - now.x) * per_pixel;
@@ -333,14 +154,14 @@ ARHOST_INLINE Vec3 light_without_fireflies(const Layer &layer, std::ptrdiff_t at
 
 // Adds the difference between the light of a row's cells in this frame and before to Layer::changes, and keeps the
 // means before in Layer::after for accumulate().
-ARHOST_INLINE void find_change(const Frame &frame, const Layer &layer, std::int32_t row) {
+ARHOST_INLINE void find_change(const Denoising &denoising, const Layer &layer, std::int32_t row) {
     for (std::int32_t x = 0; x < layer.width; x += lanes) {
         const std::ptrdiff_t at = guide_at(layer, x, row), kept = history_at(layer, x, row);
         const Int surface = surfaces_at(layer, at);
         const Bool active = has_light_in(layer, surface);
         if (!any(active))
             continue;
-        const Past past = past_of(frame, layer, x, row, load3(layer.guides + position_guide, at),
+        const Past past = past_of(denoising, layer, x, row, load3(layer.guides + position_guide, at),
                                   load3(layer.guides + normal_guide, at), surface, active);
         store3(layer.after, kept, past.light);
         if (layer.keeps_seen)
@@ -409,8 +230,7 @@ ARHOST_INLINE Float most_frames_of(const Denoising &denoising, const Layer &laye
 constexpr float unknown = -1, no_light = -2;
 
 // Accumulates a row: means over frames. The filter reads them from light[1]; the variance is that of the mean.
-ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32_t row) {
-    const Denoising &denoising = *frame.denoising;
+ARHOST_INLINE void accumulate(const Denoising &denoising, const Layer &layer, std::int32_t row) {
     for (std::int32_t x = 0; x < layer.width; x += lanes) {
         const std::ptrdiff_t at = guide_at(layer, x, row), kept = history_at(layer, x, row);
         const Int surface = surfaces_at(layer, at);
@@ -430,7 +250,7 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
                     {load(layer.after[moment_history] + kept), load(layer.after[moment_history + 1] + kept)},
                     load(layer.after[frames_history] + kept)};
         else
-            past = past_of(frame, layer, x, row, position, normal, surface, active);
+            past = past_of(denoising, layer, x, row, position, normal, surface, active);
         const Float state = load(layer.light[0][variance_light] + at);
         const Bool is_new =
             (state == Float(sampled)) | ((state == Float(sampled_early)) & (past.frames == Float(0.0f)));
@@ -490,7 +310,7 @@ ARHOST_INLINE void accumulate(const Frame &frame, const Layer &layer, std::int32
         store(layer.after[moment_history] + kept, select(active, first, Float(0.0f)));
         store(layer.after[moment_history + 1] + kept, select(active, second, Float(0.0f)));
         store(layer.after[distance_history] + kept,
-              select(active, length(position - splat(frame.camera.eye)), Float(0.0f)));
+              select(active, length(position - splat(denoising.camera.eye)), Float(0.0f)));
         store(layer.after[normal_history] + kept, float_of(select(active, packed_normal(normal), Int(0))));
         store(layer.after[surface_history] + kept, float_of(select(frames > Float(0.0f), surface, Int(0))));
         store(layer.after[frames_history] + kept, frames);
@@ -525,8 +345,7 @@ ARHOST_INLINE Float variance_of_neighbours(const Layer &layer, const float *cons
 constexpr float least_variance = 1e-6f;
 
 // Filters a row: a pass of the à-trous filter with 3×3 taps, 2^pass cells apart.
-ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t row, int pass) {
-    const Denoising &denoising = *frame.denoising;
+ARHOST_INLINE void filter(const Denoising &denoising, const Layer &layer, std::int32_t row, int pass) {
     const int step = 1 << pass;
     const float *const *from = layer.light[(pass + 1) & 1];
     float *const *to = layer.light[pass & 1];
@@ -549,7 +368,7 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
                 variance = select(needed, variance_of_neighbours(layer, from, at, row, surface), variance);
         // Surfaces are flat within the width of a tap, up to about twice the size of a pixel.
         // In curved mirrors they are not.
-        const Float distance = length(position - splat(frame.camera.eye)) *
+        const Float distance = length(position - splat(denoising.camera.eye)) *
                                select(is_kind(surface, specular_surface), Float(8.0f), Float(1.0f));
         const Float inverse_tolerance =
             Float(1.0f) / (distance * Float(2.0f * static_cast<float>(step * layer.cell_px) * denoising.pixel_angle) +
@@ -605,173 +424,19 @@ ARHOST_INLINE void filter(const Frame &frame, const Layer &layer, std::int32_t r
     }
 }
 
-// A pixel at an edge has eight rays. Four bits for each tell which light it gets: that of one of the nine pixels
-// around (3 · (dy + 1) + dx + 1), or none.
-constexpr int tap_count = 8, own_tap = 4, no_tap = 15;
-constexpr unsigned only_own = 0x44444444;
-
-// Returns the pixels of a row that differ from a neighbour.
-ARHOST_INLINE Bool edges_at(const Frame &frame, int x, int y) {
-    const Denoising &denoising = *frame.denoising;
-    const Layer &layer = denoising.objects;
-    const float *const *guides = layer.guides;
-    const std::ptrdiff_t at = guide_at(layer, x, y), down = layer.guide_stride();
-    const auto flat_if_unchanged = [&](Int surface) __attribute__((always_inline)) {
-        return select(surface == Int(unchanged_surface), Int(denoising.flat_surface), surface);
-    };
-    const Int surface = flat_if_unchanged(surfaces_at(layer, at));
-    Bool differs = surface != Int(denoising.flat_surface);
-    if (!any(differs)) {
-        for (int dy = -1; dy <= 1; ++dy)
-            for (int dx = -1; dx <= 1; ++dx)
-                if ((dx == 0) != (dy == 0) && y + dy >= 0 && y + dy < layer.height)
-                    differs = differs | (flat_if_unchanged(surfaces_at(layer, at + dy * down + dx)) != surface);
-        if (!any(differs))
-            return differs;
-    }
-    const Vec3 position = load3(guides + position_guide, at), normal = load3(guides + normal_guide, at);
-    const Float tolerance = length(position - splat(frame.camera.eye)) * Float(3 * denoising.pixel_angle);
-    Bool edge = bool_of(false);
-    for (int i = 0; i < 4; ++i) {
-        const int dx = i == 0 ? -1 : i == 1 ? 1 : 0, dy = i == 2 ? -1 : i == 3 ? 1 : 0;
-        if (y + dy < 0 || y + dy >= layer.height)
-            continue;
-        const std::ptrdiff_t there = at + dy * down + dx;
-        const Int other = flat_if_unchanged(surfaces_at(layer, there));
-        const Bool inside = Int(-1) < (lane_numbers() + Int(x + dx));
-        const Bool right = (lane_numbers() + Int(x + dx)) < Int(layer.width);
-        const Bool folded = (other != Int(0)) & ~is_kind(surface, specular_surface) &
-                            (surface != Int(denoising.flat_surface)) &
-                            ((dot(load3(guides + normal_guide, there), normal) < Float(0.8f)) |
-                             (abs(dot(load3(guides + position_guide, there) - position, normal)) > tolerance));
-        edge = edge | (inside & right & ((((other ^ surface) & Int(mirrored_unit - 1)) != Int(0)) | folded));
-    }
-    return edge & ((lane_numbers() + Int(x)) < Int(layer.width));
-}
-
-// A pixel at an edge, and its ray in Rays::blocks.
-struct EdgePixel {
-    std::int32_t x, y;
-    const float *ray;
-};
-
-// Finds the taps of two pixels. Lanes are their rays.
-ARHOST_INLINE void find_taps_of(const Frame &frame, const EdgePixel &one, const EdgePixel &other) {
-    const Denoising &denoising = *frame.denoising;
-    const Layer &layer = denoising.objects;
-    const Bool is_one = lane_numbers() < Int(tap_count);
-    const auto row = [&](int i) __attribute__((always_inline)) {
-        return select(is_one, Float(one.ray[lanes * i]), Float(other.ray[lanes * i]));
-    };
-    const auto rays = [&](int first, float z) __attribute__((always_inline)) {
-        first *= frame.rays.dimensions;
-        return Vec3{row(first), row(first + 1), frame.rays.dimensions == 3 ? row(first + 2) : Float(z)};
-    };
-    // A lattice with a different row and column for each ray.
-    static_assert(lanes == 2 * tap_count);
-    alignas(64) static constexpr float columns[lanes] = {3, 6, 1, 4, 7, 2, 5, 0, 3, 6, 1, 4, 7, 2, 5, 0};
-    const auto offset = [](Float number) __attribute__((always_inline)) {
-        return (number + Float(0.5f)) * Float(1.0f / tap_count) - Float(0.5f);
-    };
-    const Vec3 in_camera = rays(0, 1) + rays(1, 0) * offset(load(columns)) +
-                           rays(2, 0) * offset(to_float(lane_numbers() & Int(tap_count - 1)));
-    const Vec3 direction = transform(frame.camera.world_from_camera, in_camera);
-    const Bool has_ray = direction.x == direction.x;
-    const PrimaryHits hits = trace_primary(frame.scene, splat(frame.camera.eye), direction, has_ray, has_ray);
-    Int surface(0);
-    Float far(0.0f);
-    if (any(hits.is_virtual)) {
-        surface = select(hits.is_virtual, surface_of(frame.scene, hits.rays.hit, hits.is_virtual), surface);
-        far = select(hits.is_virtual, load(hits.rays.ray.tfar), far);
-    }
-    if (any(hits.caught)) {
-        surface = select(hits.caught, surface_of(frame.scene, hits.catcher_rays.hit, hits.caught), surface);
-        far = select(hits.caught, load(hits.catcher_rays.ray.tfar), far);
-    }
-    const Vec3 position = splat(frame.camera.eye) + direction * far;
-    const float *const *guides = layer.guides;
-    Int chosen = select(surface == Int(0), Int(no_tap), Int(own_tap));
-    Float least(1e30f);
-    for (int tap = 0; tap < 9; ++tap) {
-        const int dx = tap % 3 - 1, dy = tap / 3 - 1;
-        const bool inside[] = {one.y + dy >= 0 && one.y + dy < layer.height,
-                               other.y + dy >= 0 && other.y + dy < layer.height};
-        const std::ptrdiff_t at[] = {guide_at(layer, one.x + dx, inside[0] ? one.y + dy : one.y),
-                                     guide_at(layer, other.x + dx, inside[1] ? other.y + dy : other.y)};
-        const auto surface_there = [&](int i) __attribute__((always_inline)) {
-            return Int(inside[i] ? __builtin_bit_cast(int, guides[surface_guide][at[i]]) : 0);
-        };
-        const Int number = select(is_one, surface_there(0), surface_there(1)) & Int(mirrored_unit - 1);
-        const Bool flat =
-            (surface == Int(denoising.flat_surface)) & ((number == surface) | (number == Int(unchanged_surface)));
-        const Bool same = (flat | (number == surface)) & (surface != Int(0));
-        if (!any(same))
-            continue;
-        const auto value = [&](int guide) __attribute__((always_inline)) {
-            return select(is_one, Float(guides[guide][at[0]]), Float(guides[guide][at[1]]));
-        };
-        const auto vector = [&](int first) __attribute__((always_inline)) {
-            return Vec3{value(first), value(first + 1), value(first + 2)};
-        };
-        const Float from_plane = abs(dot(vector(normal_guide), vector(position_guide) - position));
-        const Float apart = select(flat | is_kind(surface, specular_surface), Float(0.0f), from_plane) +
-                            Float(tap == own_tap ? 0.0f : 0.05f * denoising.pixel_angle) * far;
-        const Bool nearer = same & (apart < least);
-        least = select(nearer, apart, least);
-        chosen = select(nearer, Int(tap), chosen);
-    }
-    alignas(64) int values[lanes];
-    store(values, chosen);
-    unsigned taps[2] = {};
-    for (int i = 0; i < lanes; ++i)
-        taps[i / tap_count] |= static_cast<unsigned>(values[i]) << 4 * (i % tap_count);
-    denoising.taps[history_at(layer, one.x, one.y)] = taps[0];
-    denoising.taps[history_at(layer, other.x, other.y)] = taps[1];
-}
-
-// Finds the taps of the pixels of a tile.
-ARHOST_INLINE void find_taps(const Frame &frame, const Tile &tile) {
-    const Denoising &denoising = *frame.denoising;
-    const Layer &layer = denoising.objects;
-    const Rectangle &all = tile.pixels;
-    bool has_edges = false;
-    for (int y = all.y0; y < all.y1; ++y)
-        for (int x = all.x0; x < all.x1; x += lanes) {
-            const Bool edges = edges_at(frame, x, y);
-            store(denoising.taps + history_at(layer, x, y), select(edges, Int(0), Int(only_own)));
-            has_edges = has_edges || any(edges);
-        }
-    if (!has_edges)
-        return;
-    const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
-    EdgePixel waiting{};
-    for_each_block(all, [&](int number, int x0, int y0, int width, int height) {
-        for (int row = 0; row < height; ++row)
-            for (int column = 0; column < width; ++column) {
-                const int x = x0 + column, y = y0 + row;
-                if (denoising.taps[history_at(layer, x, y)] == only_own)
-                    continue;
-                const EdgePixel pixel{x, y, rays + number * frame.rays.block_size() + block * row + column};
-                if (waiting.ray)
-                    find_taps_of(frame, waiting, pixel);
-                waiting = waiting.ray ? EdgePixel{} : pixel;
-            }
-    });
-    if (waiting.ray)
-        find_taps_of(frame, waiting, waiting);
-}
-
 // Writes pixels of a row that virtual objects do not affect.
-ARHOST_INLINE void write_untouched(const Frame &frame, int x, int row, int width) {
-    if (!frame.linear) {
-        __builtin_memset(frame.rgba + std::size_t{frame.stride} * row + std::size_t{4} * x, 0, 4 * width);
+ARHOST_INLINE void write_untouched(const Denoising &denoising, int x, int row, int width) {
+    if (!denoising.image.linear) {
+        __builtin_memset(denoising.image.rgba + std::size_t{denoising.image.stride} * row + std::size_t{4} * x, 0,
+                         4 * width);
         return;
     }
     constexpr std::uint16_t one = 0x3c00;
     alignas(64) static constexpr std::uint16_t four[32] = {0,   0,   0,   0,   one, one, one, 0,   0,   0,   0,
                                                            0,   one, one, one, 0,   0,   0,   0,   0,   one, one,
                                                            one, 0,   0,   0,   0,   0,   one, one, one, 0};
-    auto *to = reinterpret_cast<std::uint8_t *>(frame.linear) + std::size_t{frame.stride} * row + std::size_t{16} * x;
+    auto *to = reinterpret_cast<std::uint8_t *>(denoising.image.linear) + std::size_t{denoising.image.stride} * row +
+               std::size_t{16} * x;
     for (int column = 0; column < width; column += 4, to += sizeof four)
         if (width - column >= 4)
             __builtin_memcpy(to, four, sizeof four);
@@ -783,9 +448,9 @@ ARHOST_INLINE void write_untouched(const Frame &frame, int x, int row, int width
 class InterpolatedCatchers {
 public:
     // `x`: even.
-    ARHOST_INLINE InterpolatedCatchers(const Frame &frame, const Layer &layer, int x, int row)
+    ARHOST_INLINE InterpolatedCatchers(const Denoising &denoising, const Layer &layer, int x, int row)
         : layer_(layer), light_(layer_.light[(layer_.filter_passes() + 1) & 1]),
-          flat_surface_(frame.denoising->flat_surface), x_(x), row_(row) {}
+          flat_surface_(denoising.flat_surface), x_(x), row_(row) {}
 
     // Returns the light of surfaces that the pixels, or those beside them, show.
     ARHOST_INLINE Vec3 of(Int surface) const {
@@ -842,8 +507,9 @@ private:
 };
 
 // Returns what Frame::view shows of the pixels of a row.
-ARHOST_INLINE Vec3 viewed(const Frame &frame, const InterpolatedCatchers &catchers, int x, int row, Int surface) {
-    const Layer &objects = frame.denoising->objects, &cells = frame.denoising->catchers;
+ARHOST_INLINE Vec3 viewed(const Denoising &denoising, const InterpolatedCatchers &catchers, int x, int row,
+                          Int surface) {
+    const Layer &objects = denoising.objects, &cells = denoising.catchers;
     const Bool is_caught = has_light_in(cells, surface);
     const Int cell = cells.cell_px == 1 ? lane_numbers() : lane_numbers() >> Int(1);
     const auto value = [&](const float *of_objects, const float *of_cells) __attribute__((always_inline)) {
@@ -852,7 +518,7 @@ ARHOST_INLINE Vec3 viewed(const Frame &frame, const InterpolatedCatchers &catche
     const std::ptrdiff_t at = guide_at(objects, x, row),
                          at_cell = guide_at(cells, x / cells.cell_px, row / cells.cell_px);
     const auto grey = [](Float a) { return Vec3{a, a, a}; };
-    switch (frame.view) {
+    switch (denoising.view) {
     case View::history: {
         const std::ptrdiff_t kept = history_at(objects, x, row),
                              kept_cell = history_at(cells, x / cells.cell_px, row / cells.cell_px);
@@ -879,14 +545,13 @@ ARHOST_INLINE Vec3 viewed(const Frame &frame, const InterpolatedCatchers &catche
     }
     default: {
         const Vec3 change = catchers.of(surface);
-        return select(is_caught, frame.view == View::shadow ? (white() + change) * Float(0.5f) : change, black());
+        return select(is_caught, denoising.view == View::shadow ? (white() + change) * Float(0.5f) : change, black());
     }
     }
 }
 
 // Writes a row of the image.
-ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
-    const Denoising &denoising = *frame.denoising;
+ARHOST_INLINE Rectangle resolve(const Denoising &denoising, std::int32_t row) {
     const Layer &layer = denoising.objects;
     const float *const *from = layer.light[(layer.filter_passes() + 1) & 1];
     const float *const *guides = layer.guides;
@@ -895,17 +560,17 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
         const int width = layer.width - x < lanes ? layer.width - x : lanes;
         const Int taps = load(denoising.taps + history_at(layer, x, row));
         const std::ptrdiff_t at = guide_at(layer, x, row),
-                             at_real = frame.scene.has_gloss ? guide_at(denoising.catchers, x, row) : 0;
+                             at_real = denoising.has_gloss ? guide_at(denoising.catchers, x, row) : 0;
         const Int own_surface = surfaces_at(layer, at);
-        const bool is_picture = frame.view == View::picture;
+        const bool is_picture = denoising.view == View::picture;
         const Bool plain = is_picture ? taps == Int(static_cast<int>(only_own)) : bool_of(true);
         if (!any(~plain | ((own_surface != Int(0)) & (own_surface != Int(unchanged_surface))))) {
-            write_untouched(frame, x, row, width);
+            write_untouched(denoising, x, row, width);
             continue;
         }
         LinearBlock linear{black(), black()};
-        const InterpolatedCatchers catchers(frame, denoising.catchers, x, row),
-            glosses(frame, frame.scene.has_gloss ? denoising.gloss : denoising.catchers, x, row);
+        const InterpolatedCatchers catchers(denoising, denoising.catchers, x, row),
+            glosses(denoising, denoising.has_gloss ? denoising.gloss : denoising.catchers, x, row);
         // Of glossy catchers; `matt`: matt_row.
         Vec3 gloss = black(), matt = black();
         Float real_share(0.0f);
@@ -919,7 +584,7 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
                 transmittance = transmittance + select(changed, catchers.of(surface), black());
             linear.transmittance = linear.transmittance + select(is_real, transmittance * share, black());
             real_share = real_share + select(is_real, share, Float(0.0f));
-            if (!frame.scene.has_gloss)
+            if (!denoising.has_gloss)
                 return;
             if (const Bool changed = is_real & has_light_in(denoising.catchers, surface); any(changed)) {
                 gloss = gloss + select(changed, glosses.of(surface) * share, black());
@@ -930,7 +595,7 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
             add(own_surface, load3(from, at), load3(guides + albedo_guide, at),
                 load3(denoising.catchers.guides + albedo_guide, at_real), Float(1.0f), plain);
         else
-            linear = {select(own_surface == Int(0), black(), viewed(frame, catchers, x, row, own_surface)),
+            linear = {select(own_surface == Int(0), black(), viewed(denoising, catchers, x, row, own_surface)),
                       select(own_surface == Int(0), white(), black())};
         const Bool edges = ~plain & (lane_numbers() < Int(width));
         if (any(edges)) {
@@ -944,13 +609,13 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
                            Int(Layer::margin));
                 const Int surface = select(here, bits_of(gather(guides[surface_guide], there)), Int(0));
                 const Vec3 of_matt =
-                    frame.scene.has_gloss ? gather3(denoising.catchers.guides + albedo_guide, there) : black();
+                    denoising.has_gloss ? gather3(denoising.catchers.guides + albedo_guide, there) : black();
                 add(surface, gather3(from, there), gather3(guides + albedo_guide, there), of_matt,
                     Float(1.0f / tap_count), edges);
             }
         }
         linear.transmittance = bounded_for_halves(linear.transmittance);
-        if (frame.scene.has_gloss && is_picture) {
+        if (denoising.has_gloss && is_picture) {
             const auto positive = [](Vec3 a) __attribute__((always_inline)) {
                 return Vec3{max(a.x, Float(0.0f)), max(a.y, Float(0.0f)), max(a.z, Float(0.0f))};
             };
@@ -958,15 +623,16 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
             const Float behind = Float(1.0f) / max(real_share, Float(1e-3f)); // means over what is behind objects
             const Float across = to_float(lane_numbers() + Int(x)) + Float(0.5f),
                         down(static_cast<float>(row) + 0.5f);
-            remove_covered(frame, positive(-gloss) * behind, matt * behind, across, down, linear);
+            remove_covered(denoising.video, positive(-gloss) * behind, matt * behind, across, down, linear);
         }
         linear.added = bounded_for_halves(linear.added);
         bool affected = false;
-        if (frame.linear) {
-            affected = write_linear(frame, x, row, width, 1, linear, lanes);
+        if (denoising.image.linear) {
+            affected = write_linear(denoising.image, x, row, width, 1, linear, lanes);
         } else {
-            const Int pixels = straight_of(frame, linear);
-            __builtin_memcpy(frame.rgba + std::size_t{frame.stride} * row + std::size_t{4} * x, &pixels, 4 * width);
+            const Int pixels = straight_of(denoising.image, linear);
+            __builtin_memcpy(denoising.image.rgba + std::size_t{denoising.image.stride} * row + std::size_t{4} * x,
+                             &pixels, 4 * width);
             affected = any(((pixels >> Int(24)) != Int(0)) & (lane_numbers() < Int(width)));
         }
         if (affected) {
@@ -976,3 +642,11 @@ ARHOST_INLINE Rectangle resolve(const Frame &frame, std::int32_t row) {
     }
     return drawn;
 }
+
+} // namespace
+
+Steps steps() {
+    return {find_change, accumulate, filter, resolve};
+}
+
+} // namespace arhost::raytracer_common::ARHOST_ISA

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "trace.inl"
+#include "raytracer_common/packets/vectors.inl"
 
 // Linear colour and alpha.
 struct Texel {
@@ -23,7 +23,7 @@ ARHOST_INLINE Int wrapped(Int i, std::int32_t size, arhost_wrap wrap) {
     return within;
 }
 
-ARHOST_INLINE Texel texel_at(const Scene &scene, const Texture &texture, Int x, Int y) {
+ARHOST_INLINE Texel texel_at(const float *linear_of_srgb8, const Texture &texture, Int x, Int y) {
     const Int at = y * Int(texture.width) + x;
     if (texture.format == ARHOST_TEXEL_RGBA32F) {
         const auto *from = static_cast<const float *>(texture.texels);
@@ -36,14 +36,14 @@ ARHOST_INLINE Texel texel_at(const Scene &scene, const Texture &texture, Int x, 
     };
     const Float alpha = to_float(byte(3)) * Float(1.0f / 255);
     if (texture.format == ARHOST_TEXEL_SRGB8)
-        return {{gather(scene.linear_of_srgb8, byte(0)), gather(scene.linear_of_srgb8, byte(1)),
-                 gather(scene.linear_of_srgb8, byte(2))},
-                alpha};
+        return {
+            {gather(linear_of_srgb8, byte(0)), gather(linear_of_srgb8, byte(1)), gather(linear_of_srgb8, byte(2))},
+            alpha};
     return {Vec3{to_float(byte(0)), to_float(byte(1)), to_float(byte(2))} * Float(1.0f / 255), alpha};
 }
 
-// Samples a texture with bilinear filtering.
-ARHOST_INLINE Texel sample_texture(const Scene &scene, const Texture &texture, Float u, Float v) {
+// Samples a texture with bilinear filtering. `linear_of_srgb8`: linear value of each of the 256 sRGB codes.
+ARHOST_INLINE Texel sample_texture(const float *linear_of_srgb8, const Texture &texture, Float u, Float v) {
     // Reduces a coordinate to an equivalent one near 0: the texel index must fit an int, and the float must retain
     // its fraction.
     const auto reduced = [](Float t, arhost_wrap wrap) __attribute__((always_inline)) {
@@ -62,6 +62,6 @@ ARHOST_INLINE Texel sample_texture(const Scene &scene, const Texture &texture, F
     const auto mix = [](Texel a, Texel b, Float t) __attribute__((always_inline)) {
         return Texel{a.colour + (b.colour - a.colour) * t, a.alpha + (b.alpha - a.alpha) * t};
     };
-    return mix(mix(texel_at(scene, texture, x0, y0), texel_at(scene, texture, x1, y0), tx),
-               mix(texel_at(scene, texture, x0, y1), texel_at(scene, texture, x1, y1), tx), ty);
+    return mix(mix(texel_at(linear_of_srgb8, texture, x0, y0), texel_at(linear_of_srgb8, texture, x1, y0), tx),
+               mix(texel_at(linear_of_srgb8, texture, x0, y1), texel_at(linear_of_srgb8, texture, x1, y1), tx), ty);
 }

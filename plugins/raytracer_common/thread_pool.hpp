@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-namespace rt_embree {
+namespace arhost::raytracer_common {
 
 // While an object of this class exists, the current thread treats denormal floats as 0: operations with denormals
 // take about a hundred cycles.
@@ -52,4 +52,4 @@ private:
     std::vector<std::jthread> helpers_; // last member: destroyed, and thus joined, before the others
 };
 
-} // namespace rt_embree
+} // namespace arhost::raytracer_common

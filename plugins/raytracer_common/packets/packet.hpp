@@ -3,8 +3,8 @@
 // SIMD types with 16 lanes, like Embree's widest ray packets: Float, Bool and Int. Each consists of compiler vectors
 // that are as wide as the processor's registers.
 //
-// The kernel is compiled once per instruction set, each in its own namespace (ARHOST_ISA), so that code for one
-// instruction set is never linked into another. For the same reason it calls no inline functions of the standard
+// Code that uses them is compiled once per instruction set, each in its own namespace (ARHOST_ISA), so that code for
+// one instruction set is never linked into another. For the same reason it calls no inline functions of the standard
 // library.
 //
 // The Highway library is not used: its vectors are as wide as a register, so every formula would need a loop over the
@@ -20,7 +20,7 @@
 #include <immintrin.h>
 #endif
 
-namespace rt_embree::ARHOST_ISA {
+namespace arhost::raytracer_common::ARHOST_ISA {
 
 #define ARHOST_INLINE inline __attribute__((always_inline))
 // A large function with several callers. Packets are passed by reference: how they are passed by value depends on the
@@ -116,7 +116,7 @@ struct alignas(64) Float {
     ARHOST_INLINE friend Bool operator==(Float a, Float b) { ARHOST_BINARY(Bool, a_ == b_); }
 };
 
-using Vec3 = arhost::shading::Vec3T<Float>;
+using Vec3 = shading::Vec3T<Float>;
 
 ARHOST_INLINE Bool bool_of(bool b) {
     Bool a;
@@ -397,4 +397,4 @@ ARHOST_INLINE Float turn_of(Float x, Float y) {
 #undef ARHOST_UNARY
 #undef ARHOST_BINARY
 
-} // namespace rt_embree::ARHOST_ISA
+} // namespace arhost::raytracer_common::ARHOST_ISA

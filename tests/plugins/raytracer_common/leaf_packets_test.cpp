@@ -22,7 +22,7 @@ namespace {
 
 #include "leaf_calls.inl"
 
-using namespace rt_embree;
+using namespace arhost::raytracer_common;
 
 struct InstructionSet {
     const char *name;

@@ -4,9 +4,9 @@
 // for other processors.
 #include "leaf_packets.hpp"
 
-#include "kernel/packet.hpp"
+#include "raytracer_common/packets/packet.hpp"
 
-namespace rt_embree::ARHOST_ISA {
+namespace arhost::raytracer_common::ARHOST_ISA {
 namespace {
 #include "leaf_calls.inl"
 }
@@ -20,4 +20,4 @@ void call_leaf(int number, const Packet (&arguments)[max_arguments], Packet (&re
         store(results[i].lane, to[i]);
 }
 
-} // namespace rt_embree::ARHOST_ISA
+} // namespace arhost::raytracer_common::ARHOST_ISA
