@@ -390,6 +390,8 @@ void mean(Context &context) {
     for (int frame = 0; frame < frames; ++frame) {
         tracer.set_sequence(static_cast<std::uint64_t>(frame));
         const std::vector<double> numbers = numbers_of(tracer.render_linear(view));
+        if (tracer.state_size() > 0)
+            throw Skip("it has a state, so each image may be a mean already; use options with which it has none");
         for (std::size_t i = 0; i < sum.size(); ++i) {
             sum[i] += numbers[i];
             error_of_one += std::pow(numbers[i] - expected[i], 2) / (frames * static_cast<double>(sum.size()));

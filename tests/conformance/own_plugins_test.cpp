@@ -55,7 +55,8 @@ const auto name_of = [](const auto &info) { return info.param.name; };
 INSTANTIATE_TEST_SUITE_P(
     All, OwnPlugins,
     testing::Values(OwnPlugin{"ArUco", "tracker_aruco", {}}, OwnPlugin{"Patterns", "tracker_pattern", {}},
-                    OwnPlugin{"Vulkan", "rt_vulkan", {}}, OwnPlugin{"Reference", "rt_embree", {"quality=reference"}},
+                    OwnPlugin{"Vulkan", "rt_vulkan", {}}, OwnPlugin{"Embree", "rt_embree", {}},
+                    OwnPlugin{"Reference", "rt_embree", {"quality=reference"}},
                     OwnPlugin{"DefaultPictures", "source_file", {}},
                     OwnPlugin{"Synthetic", "source_synthetic", {"width=160", "height=120", "frames=60"}},
                     OwnPlugin{"FilePictures", "source_file", {"path=in/%02d.png"}},
