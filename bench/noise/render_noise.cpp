@@ -33,7 +33,8 @@
 
 namespace {
 
-constexpr double video_light = 0.4; // linear
+constexpr std::uint8_t video_code = 170; // of all pixels of the video
+const double video_light = arhost::shading::srgb_decode(video_code / 255.0);
 
 using Codes = std::vector<float>; // R, G, B of each pixel, not rounded
 
@@ -111,12 +112,34 @@ void write_ppm(const std::string &file, const Codes &codes, std::uint32_t width,
         out.put(static_cast<char>(std::lround(code)));
 }
 
+class GreyVideo {
+public:
+    GreyVideo(std::uint32_t width, std::uint32_t height) : pixels_(std::size_t{3} * width * height, video_code) {
+        format_.struct_size = sizeof format_;
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
+        format_.width = width;
+        format_.height = height;
+        format_.stride[0] = 3 * width;
+        frame_.struct_size = sizeof frame_;
+        frame_.format = &format_;
+        frame_.plane[0] = pixels_.data();
+    }
+    GreyVideo(const GreyVideo &) = delete;
+    GreyVideo &operator=(const GreyVideo &) = delete;
+    const arhost_frame &frame() const { return frame_; }
+
+private:
+    std::vector<std::uint8_t> pixels_;
+    arhost_frame_format format_{};
+    arhost_frame frame_{};
+};
+
 // Renders frames as a run does.
 class Run {
 public:
     Run(const arhost_raytracer_setup &setup, const rt_embree::Settings &settings, const arhost::Host &host,
-        std::uint32_t shading_px = 1)
-        : renderer_(setup, settings, host), shading_px_(shading_px),
+        const GreyVideo &video, std::uint32_t shading_px = 1)
+        : renderer_(setup, settings, host), video_(video), shading_px_(shading_px),
           pixels_(std::size_t{8} * setup.width * setup.height) {
         for (auto &state : states_)
             state.resize(renderer_.state_size() / sizeof(Aligned) + 1);
@@ -134,7 +157,7 @@ public:
             state = {count_ > 0 ? states_[(count_ + 1) % 2].data() : nullptr, states_[count_ % 2].data()};
         const auto begin = std::chrono::steady_clock::now();
         const std::clock_t cpu = std::clock();
-        renderer_.render(camera, image, motion, nullptr, sequence, state, shading_px_);
+        renderer_.render(camera, image, motion, &video_.frame(), sequence, state, shading_px_);
         wall_ms.push_back(
             std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
         cpu_ms.push_back(1000.0 * static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC);
@@ -149,6 +172,7 @@ private:
         std::byte bytes[64];
     };
     rt_embree::Renderer renderer_;
+    const GreyVideo &video_;
     std::uint32_t shading_px_;
     std::vector<std::uint16_t> pixels_;
     std::array<std::vector<Aligned>, 2> states_;
@@ -206,7 +230,9 @@ void run(int argc, char **argv) {
     const arhost_intrinsics intrinsics = arhost::bench::centred_pinhole(width, height, 1.15 * width);
     const arhost::scene::Arena arena = arhost::scene::load_scene(argv[1]).build();
     const arhost_host host = arhost::bench::printing_host("render-noise");
-    const arhost_raytracer_setup setup = arhost::bench::linear_setup(arena.scene(), intrinsics);
+    const GreyVideo video(width, height);
+    arhost_raytracer_setup setup = arhost::bench::linear_setup(arena.scene(), intrinsics);
+    setup.video_format = video.frame().format;
     rt_embree::Settings settings;
     settings.threads = static_cast<unsigned>(value["threads"]);
     settings.light_samples = static_cast<std::int32_t>(value["light_samples"]);
@@ -215,8 +241,8 @@ void run(int argc, char **argv) {
     settings.photons = static_cast<std::uint32_t>(value["photons"]);
     settings.denoise = value["denoise"] != 0;
     converged.samples = 64;
-    Run noisy(setup, settings, arhost::Host(&host), static_cast<std::uint32_t>(value["shading_px"]));
-    Run reference(setup, converged, arhost::Host(&host));
+    Run noisy(setup, settings, arhost::Host(&host), video, static_cast<std::uint32_t>(value["shading_px"]));
+    Run reference(setup, converged, arhost::Host(&host), video);
     const int frames = static_cast<int>(value["frames"]), references = static_cast<int>(value["reference"]);
     MovingObjects objects(arena.scene());
     const auto motion_at = [&](int frame) {

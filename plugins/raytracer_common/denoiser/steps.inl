@@ -15,40 +15,8 @@ namespace arhost::raytracer_common::ARHOST_ISA {
 namespace {
 
 // Included inside the namespace so that each instruction set has its own copy of the functions.
-#include "raytracer_common/denoiser/layers.inl"
+#include "raytracer_common/denoiser/history.inl"
 #include "raytracer_common/packets/image.inl"
-
-// Normals with 10 bits per component.
-ARHOST_INLINE Int packed_normal(Vec3 n) {
-    const auto bits = [](Float a) __attribute__((always_inline)) {
-        return to_int(a * Float(511.0f) + Float(512.0f));
-    };
-    return bits(n.x) | (bits(n.y) << Int(10)) | (bits(n.z) << Int(20));
-}
-ARHOST_INLINE Vec3 unpacked_normal(Int a) {
-    const auto value = [](Int bits) __attribute__((always_inline)) {
-        return (to_float(bits & Int(1023)) - Float(511.5f)) * Float(1.0f / 511);
-    };
-    return {value(a), value(a >> Int(10)), value(a >> Int(20))};
-}
-
-// The pixel of an image that shows a point.
-struct Projected {
-    Float x, y;     // px, pixel centres at integers
-    Float distance; // mm, from the camera
-    Bool inside;    // in front of the camera
-};
-ARHOST_INLINE Projected projected(const Denoising &denoising, const Camera &camera, Vec3 position) {
-    const Vec3 to_point = position - splat(camera.eye);
-    const PixelOf pixel = pixel_towards(denoising.video, camera, to_point);
-    // From texels of the video to pixels of the image.
-    const Texture &video = denoising.video.image;
-    const Layer &pixels = denoising.objects;
-    const float across = static_cast<float>(pixels.width) / static_cast<float>(video.width),
-                down = static_cast<float>(pixels.height) / static_cast<float>(video.height);
-    return {pixel.x * Float(across) - Float(0.5f), pixel.y * Float(down) - Float(0.5f), length(to_point),
-            pixel.in_front};
-}
 
 // The means of earlier frames at surfaces.
 struct Past {
@@ -65,57 +33,35 @@ ARHOST_INLINE Past past_of(const Denoising &denoising, const Layer &layer, int x
     Projected now{};
     if (layer.cell_px > 1)
         now = projected(denoising, denoising.camera, position);
-    if (denoising.before_from_now) {
-        const Int first = object_of_surface(surface) * Int(12);
-        const auto column = [&](int i) __attribute__((always_inline)) {
-            const float *table = denoising.before_from_now + 3 * i;
-            const Int at = select(active, first, Int(0));
-            return Vec3{gather(table, at), gather(table + 1, at), gather(table + 2, at)};
-        };
-        const Vec3 columns[] = {column(0), column(1), column(2), column(3)};
-        position = columns[0] * position.x + columns[1] * position.y + columns[2] * position.z + columns[3];
-        normal = columns[0] * normal.x + columns[1] * normal.y + columns[2] * normal.z;
-    }
-    Projected at = projected(denoising, denoising.camera_before, position);
+    const PastPoints before = points_before(denoising, position, normal, surface, active);
+    Projected at = projected(denoising, denoising.camera_before, before.position);
     if (layer.cell_px > 1) {
         const Float per_pixel(1.0f / static_cast<float>(layer.cell_px));
         at.x = to_float(lane_numbers() + Int(x)) + (at.x - now.x) * per_pixel;
         at.y = Float(static_cast<float>(row)) + (at.y - now.y) * per_pixel;
     }
-    const Float left = floor(max(min(at.x + Float(1.0f / 64), Float(1e6f)), Float(-2.0f))),
-                top = floor(max(min(at.y + Float(1.0f / 64), Float(1e6f)), Float(-2.0f)));
-    const Float along = max(at.x - left, Float(0.0f)), down = max(at.y - top, Float(0.0f));
     Float total(0.0f);
     const bool needs_seen =
         layer.keeps_seen && !denoising.seen_moves() && any(active & is_kind(surface, specular_surface));
-    for (int i = 0; i < 4; ++i) {
-        const Int column = to_int(left) + Int(i & 1), line = to_int(top) + Int(i >> 1);
-        const Float weight = (i & 1 ? along : Float(1.0f) - along) * (i >> 1 ? down : Float(1.0f) - down);
-        Bool here = active & at.inside & (Int(-1) < column) & (column < Int(layer.width)) & (Int(-1) < line) &
-                    (line < Int(layer.height)) & (weight > Float(0.01f));
-        const Int cell = select(here, line * Int(layer.stride) + column, Int(0));
-        here = here & (bits_of(gather(layer.before[surface_history], cell)) == surface) &
-               (abs(gather(layer.before[distance_history], cell) - at.distance) < at.distance * Float(0.03f)) &
-               (dot(unpacked_normal(bits_of(gather(layer.before[normal_history], cell))), normal) > Float(0.8f));
-        if (!any(here))
-            continue;
-        const Float share = select(here, weight, Float(0.0f));
-        const auto add = [&](Float & sum, int of) __attribute__((always_inline)) {
-            sum = sum + select(here, gather(layer.before[of], cell), Float(0.0f)) * share;
-        };
-        add(past.light.x, 0);
-        add(past.light.y, 1);
-        add(past.light.z, 2);
-        add(past.moments[0], moment_history);
-        add(past.moments[1], moment_history + 1);
-        add(past.frames, frames_history);
-        total = total + share;
-        if (!needs_seen)
-            continue;
-        add(past.seen.x, seen_history);
-        add(past.seen.y, seen_history + 1);
-        add(past.seen.z, seen_history + 2);
-    }
+    for_each_past_cell(
+        layer, at.x, at.y, at.distance, before.normal, surface,
+        active & at.inside, [&](Int cell, Float share, Bool here) __attribute__((always_inline)) {
+            const auto add = [&](Float & sum, int of) __attribute__((always_inline)) {
+                sum = sum + select(here, gather(layer.before[of], cell), Float(0.0f)) * share;
+            };
+            add(past.light.x, 0);
+            add(past.light.y, 1);
+            add(past.light.z, 2);
+            add(past.moments[0], moment_history);
+            add(past.moments[1], moment_history + 1);
+            add(past.frames, frames_history);
+            total = total + share;
+            if (!needs_seen)
+                return;
+            add(past.seen.x, seen_history);
+            add(past.seen.y, seen_history + 1);
+            add(past.seen.z, seen_history + 2);
+        });
     const Float scale = select(total > Float(0.0f), Float(1.0f) / max(total, Float(1e-6f)), Float(0.0f));
     past.light = past.light * scale;
     past.seen = past.seen * scale;

@@ -4,8 +4,6 @@
 #pragma once
 #include "path_catcher.inl"
 
-#include "raytracer_common/denoiser/layers.inl"
-
 // Returns the numbers of the surfaces hit (surface_number()).
 ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool active) {
     Int kinds(0);

@@ -5,6 +5,8 @@
 #include "filmed.inl"
 #include "photons.inl"
 
+#include "raytracer_common/denoiser/history.inl"
+
 // Returns paths whose radiance is added to another plane. The planes also have different random numbers.
 ARHOST_INLINE Paths in_plane(Paths paths, Plane plane) {
     paths.pixel = (paths.pixel & Int(tile_pixels - 1)) + Int(plane * tile_pixels);
@@ -318,6 +320,43 @@ struct FilmedLight {
     Bool added;
 };
 
+// The change of the light of catchers, relative to their light without virtual objects.
+struct KnownChange {
+    Bool known;
+    Vec3 change;
+};
+// Returns what the denoiser knows from earlier frames of catchers that were in the picture, so that paths which
+// arrive there need not go on.
+ARHOST_INLINE KnownChange known_change(const Frame &frame, const RTCHit16 &hit, const Surface &s, Bool active) {
+    constexpr float least_frames = 8; // means of fewer frames have more noise than new samples in each frame
+    KnownChange past{bool_of(false), black()};
+    if (!frame.denoising || !frame.denoising->catchers.before[0] || frame.view != View::picture)
+        return past;
+    const Denoising &denoising = *frame.denoising;
+    const Layer &layer = denoising.catchers;
+    const Int surface = ((object_number(frame.scene, hit) + Int(1)) << Int(2)) | Int(real_surface);
+    const PastPoints before = points_before(denoising, s.position, s.normal, surface, active);
+    const Projected at = projected(denoising, denoising.camera_before, before.position);
+    const float side = static_cast<float>(layer.cell_px);
+    const auto cell_of = [&](Float px) __attribute__((always_inline)) {
+        return (px + Float(0.5f)) * Float(1 / side) - Float(0.5f);
+    };
+    Float frames(0.0f), total(0.0f);
+    for_each_past_cell(
+        layer, cell_of(at.x), cell_of(at.y), at.distance, before.normal, surface,
+        active & at.inside, [&](Int cell, Float share, Bool here) __attribute__((always_inline)) {
+            const auto value = [&](int row) __attribute__((always_inline)) {
+                return select(here, gather(layer.before[row], cell), Float(0.0f)) * share;
+            };
+            past.change = past.change + Vec3{value(0), value(1), value(2)};
+            frames = frames + value(frames_history);
+            total = total + share;
+        });
+    past.known = (total > Float(0.5f)) & (frames >= total * Float(least_frames));
+    past.change = past.change * (Float(1.0f) / max(total, Float(1e-6f)));
+    return past;
+}
+
 // Adds the light of real surfaces that the video shows, as virtual objects change it.
 ARHOST_INLINE FilmedLight add_filmed(Work &work, const RTCHit16 &hit, const Surface &s, const Paths &paths,
                                      Bool active) {
@@ -326,21 +365,26 @@ ARHOST_INLINE FilmedLight add_filmed(Work &work, const RTCHit16 &hit, const Surf
     active = filmed.inside;
     if (!any(active))
         return {filmed.light, active};
+    const KnownChange past = known_change(frame, hit, s, active);
+    add_radiance(work, paths, filmed.light * (white() + past.change), active & past.known);
+    const Bool unknown = active & ~past.known;
+    if (!any(unknown))
+        return {filmed.light, active};
     const Vec3 relative = relative_change(frame, s, irradiance_without_objects(frame, s));
     const Float form_factors = form_factors_of(frame.path, s);
     // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
     // directly.
     const int count = source_samples(frame, paths.depth - 1);
     const Vec3 change =
-        sampled_change(work, paths, s, form_factors, count, active, [](const SourceSample &, Bool) {}) +
-        photon_irradiance(work, paths, s, active);
-    add_radiance(work, paths, filmed.light * (white() + change * relative), active);
+        sampled_change(work, paths, s, form_factors, count, unknown, [](const SourceSample &, Bool) {}) +
+        photon_irradiance(work, paths, s, unknown);
+    add_radiance(work, paths, filmed.light * (white() + change * relative), unknown);
     const float sample_ratio = static_cast<float>(count) / static_cast<float>(source_samples(frame, paths.depth));
     // If the described light is weaker than that of the video, the surface must not reflect more than it receives.
     const Vec3 reflectance = filmed.light * relative;
     const Vec3 albedo{min(reflectance.x, Float(1.0f)), min(reflectance.y, Float(1.0f)),
                       min(reflectance.z, Float(1.0f))};
-    enqueue_bounce(work, paths, s, form_factors, paths.throughput * albedo, sample_ratio, active);
+    enqueue_bounce(work, paths, s, form_factors, paths.throughput * albedo, sample_ratio, unknown);
     return {filmed.light, active};
 }
 
