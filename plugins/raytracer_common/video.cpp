@@ -118,6 +118,33 @@ std::array<float, 3> environment_scale(const arhost_environment &environment, co
     return scale;
 }
 
+ColourTables::ColourTables() : srgb8(shading::make_srgb8_table()) {
+    for (std::size_t code = 0; code < linear_of_srgb8.size(); ++code)
+        linear_of_srgb8[code] = static_cast<float>(shading::srgb_decode(static_cast<double>(code) / 255));
+}
+
+Video video_through(const arhost_intrinsics &intrinsics, const ColourTables &tables, std::uint32_t width,
+                    std::uint32_t height) {
+    Video video{};
+    video.image = {nullptr,
+                   static_cast<std::int32_t>(intrinsics.width),
+                   static_cast<std::int32_t>(intrinsics.height),
+                   ARHOST_TEXEL_SRGB8,
+                   ARHOST_WRAP_CLAMP,
+                   ARHOST_WRAP_CLAMP};
+    video.linear_of_srgb8 = tables.linear_of_srgb8.data();
+    video.fx = static_cast<float>(intrinsics.fx);
+    video.fy = static_cast<float>(intrinsics.fy);
+    video.cx = static_cast<float>(intrinsics.cx);
+    video.cy = static_cast<float>(intrinsics.cy);
+    video.distortion = intrinsics.distortion;
+    std::copy_n(intrinsics.coefficients, intrinsics.coefficient_count, video.coefficients);
+    video.max_radius_squared = max_radius_squared(intrinsics);
+    video.pixel_width = 1 / static_cast<float>(width);
+    video.pixel_height = 1 / static_cast<float>(height);
+    return video;
+}
+
 float max_radius_squared(const arhost_intrinsics &intrinsics) {
     if (intrinsics.distortion == ARHOST_DISTORTION_NONE)
         return std::numeric_limits<float>::infinity();

@@ -3,6 +3,8 @@
 // The video frame under the overlay, as a texture.
 #pragma once
 
+#include "raytracer_common/image.hpp"
+
 #include <arhost/camera.h>
 #include <arhost/frame.h>
 #include <arhost/scene.h>
@@ -30,6 +32,18 @@ private:
 
 // Returns the factors by which the texels of an environment are multiplied. `video`: NULL if it is unknown.
 std::array<float, 3> environment_scale(const arhost_environment &environment, const VideoImage *video);
+
+// The tables that images and textures need.
+struct ColourTables {
+    shading::Srgb8Table srgb8;
+    std::array<float, 256> linear_of_srgb8; // linear value of each sRGB code
+    ColourTables();
+};
+
+// Returns a video through a lens, without texels. `tables` must outlive the result. `width`, `height`: of the
+// overlay, px.
+Video video_through(const arhost_intrinsics &intrinsics, const ColourTables &tables, std::uint32_t width,
+                    std::uint32_t height);
 
 // Returns the largest squared length of (x/z, y/z) of the directions in the picture: lens models are not valid far
 // outside of it. Infinite for a camera without distortion.

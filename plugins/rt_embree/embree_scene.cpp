@@ -139,7 +139,7 @@ void copy3(const float *from, float *to) {
 EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robust, const arhost::Host &host)
     : arena_(arena), host_(host), robust_(robust), static_quality_(static_quality(arena)),
       device_(rtcNewDevice(("threads=" + std::to_string(threads) + ",set_affinity=0").c_str())),
-      srgb8_(std::make_unique<arhost::shading::Srgb8Table>(arhost::shading::make_srgb8_table())) {
+      colour_tables_(std::make_unique<ColourTables>()) {
     check();
     for (const RTCDeviceProperty property :
          {RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED,
@@ -220,9 +220,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     view_.shadow_alpha_opaque = quantized_alpha(arena.shadow_alpha_opaque);
     view_.shadow_alpha_translucent = quantized_alpha(arena.shadow_alpha_translucent);
     view_.coloured_shadows = arena.coloured_shadows != 0;
-    for (int code = 0; code < 256; ++code)
-        linear_of_srgb8_.push_back(static_cast<float>(arhost::shading::srgb_decode(code / 255.0)));
-    view_.linear_of_srgb8 = linear_of_srgb8_.data();
+    view_.linear_of_srgb8 = colour_tables_->linear_of_srgb8.data();
     if (const arhost_environment &from = arena.environment; from.texture != ARHOST_NONE) {
         Environment &to = view_.environment;
         to.image = &textures_[from.texture];
@@ -230,7 +228,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         to.rows = elements<float>(arena, from.rows).data();
         to.columns = elements<float>(arena, from.columns).data();
     }
-    view_.srgb8 = srgb8_.get();
+    view_.srgb8 = &colour_tables_->srgb8;
 }
 
 void EmbreeScene::set_environment_scale(const std::array<float, 3> &scale) {

@@ -7,6 +7,7 @@
 #include "bvh_quality.hpp"
 #include "hit_filter.hpp"
 #include "raytracer_common/light_sources.hpp"
+#include "raytracer_common/video.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/motion.h>
@@ -39,6 +40,7 @@ public:
 
     const arhost_scene &arena() const { return arena_; }
     const Scene &view() const { return view_; }
+    const ColourTables &colour_tables() const { return *colour_tables_; }
     // Bounding boxes in world space, one per object. The boxes of occluders are empty: their pixels always have alpha
     // 0.
     const std::vector<Box> &visible_boxes() const { return visible_boxes_; }
@@ -98,8 +100,7 @@ private:
     std::vector<Box> visible_boxes_;
     std::uint64_t rebuilds_ = 0;
     std::vector<Texture> textures_;
-    std::unique_ptr<const arhost::shading::Srgb8Table> srgb8_;
-    std::vector<float> linear_of_srgb8_;
+    std::unique_ptr<const ColourTables> colour_tables_;
     Scene view_{};
 };
 

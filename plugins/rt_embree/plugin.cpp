@@ -12,9 +12,6 @@
 namespace rt_embree {
 namespace {
 
-constexpr const char *views[] = {"picture", "shadow",   "bounce",  "caustics",
-                                 "history", "variance", "normals", nullptr}; // as in View
-
 class Plugin {
 public:
     Plugin(const arhost::Host &host, const arhost::Options &options) : host_(host) {

@@ -139,8 +139,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       single_path_(settings.single_path), max_radiance_(settings.max_radiance), view_(settings.view),
       blends_codes_(setup.compositing != ARHOST_COMPOSITING_LINEAR), full_samples_(settings.samples),
-      photons_per_sample_(settings.photons),
-      max_radius_squared_(arhost::raytracer_common::max_radius_squared(full_intrinsics_)) {
+      photons_per_sample_(settings.photons), lens_(video_through(full_intrinsics_, scene_.colour_tables(),
+                                                                 full_intrinsics_.width, full_intrinsics_.height)) {
     if (setup.form == ARHOST_IMAGE_FORM_LINEAR && setup.scene->integrator != ARHOST_INTEGRATOR_PATH)
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
                       "linear images need a scene with the path integrator; request straight ones");
@@ -302,22 +302,10 @@ PathScene Renderer::path_scene() const {
     path.sphere_count = static_cast<std::int32_t>(lights_->spheres().size());
     path.max_radiance = max_radiance_;
     path.least_irradiance = lights_->least_irradiance(has_video_ ? &video_ : nullptr);
-    const arhost_intrinsics &of = full_intrinsics_;
     path.brightest_texel = brightest_texel_;
-    path.video.linear_of_srgb8 = scene_.view().linear_of_srgb8;
-    path.video.image = {has_video_ ? video_.texels() : nullptr,
-                        static_cast<std::int32_t>(of.width),
-                        static_cast<std::int32_t>(of.height),
-                        ARHOST_TEXEL_SRGB8,
-                        ARHOST_WRAP_CLAMP,
-                        ARHOST_WRAP_CLAMP};
-    path.video.fx = static_cast<float>(of.fx);
-    path.video.fy = static_cast<float>(of.fy);
-    path.video.cx = static_cast<float>(of.cx);
-    path.video.cy = static_cast<float>(of.cy);
-    path.video.distortion = of.distortion;
-    std::copy_n(of.coefficients, of.coefficient_count, path.video.coefficients);
-    path.video.max_radius_squared = max_radius_squared_;
+    path.video = lens_;
+    if (has_video_)
+        path.video.image.texels = video_.texels();
     path.video.pixel_width = 1 / static_cast<float>(intrinsics_.width);
     path.video.pixel_height = 1 / static_cast<float>(intrinsics_.height);
     return path;

@@ -108,8 +108,8 @@ private:
     std::array<std::optional<PhotonSums>, 16> photon_sums_;
     std::uint32_t photons_per_set_ = 0;
     arhost::raytracer_common::VideoImage video_;
-    bool has_video_ = false; // of the current frame
-    float max_radius_squared_;
+    bool has_video_ = false;           // of the current frame
+    Video lens_;                       // of the largest image, without a video
     std::optional<Denoiser> denoiser_; // empty without denoising
     bool remembers_ = false;           // whether the state contains the surroundings, after the denoiser's part
 

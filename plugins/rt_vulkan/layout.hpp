@@ -113,7 +113,8 @@ struct Frame {
     float environment_from_world[3][4];
     std::uint32_t environment_rows, environment_columns;
     float shadow_alpha_opaque, shadow_alpha_translucent;
-    std::uint32_t has_slopes, unused[3];
+    std::uint32_t has_slopes, denoises, seen_moves;
+    float pixel_angle;
     float samples[max_samples][4];
     // The path integrator.
     float spheres[arhost::raytracer_common::LightSources::max_spheres][4];
@@ -133,7 +134,7 @@ struct Frame {
     float targets[arhost::raytracer_common::LightSources::max_spheres][4];
     std::uint32_t target_count, first_target, first_target_chance;
     float scene_extent;
-    std::uint32_t photon_count, first_photon, unused_2[2];
+    std::uint32_t photon_count, first_photon, shown_parts, unused;
 };
 
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
@@ -166,7 +167,7 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss, has_photons;
+    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss, has_photons, may_denoise;
 };
 
 } // namespace rt_vulkan

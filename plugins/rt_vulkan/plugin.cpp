@@ -5,12 +5,15 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <limits>
 #include <optional>
 
 namespace rt_vulkan {
 namespace {
+
+using arhost::raytracer_common::View, arhost::raytracer_common::views;
 
 arhost_device_kind kind_of(VkPhysicalDeviceType type) {
     switch (type) {
@@ -73,6 +76,14 @@ public:
         settings_.samples = samples_of(options);
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
+        settings_.denoise = quality_ != "reference" && !settings_.accumulate;
+        settings_.denoiser_threads = static_cast<unsigned>(options.integer("threads"));
+        settings_.view = static_cast<View>(std::ranges::find(views, options.text("show")) - views);
+        if (settings_.view != View::picture && !settings_.denoise)
+            throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                                  "option 'show': '" + options.text("show") +
+                                      "' is a view of the denoiser; use 'quality: realtime' or 'balanced', and not "
+                                      "'accumulate'");
         settings_.single_path = options.text("glass") == "path";
         settings_.photons = static_cast<std::uint32_t>(options.integer("photons"));
         if (const double bound = options.real("max_radiance"); bound > 0)
@@ -87,14 +98,29 @@ public:
         host_.info("Vulkan device '" + physical_.name + "' (" + physical_.uuid + "), path " + name_of(paths_[0]) +
                    ", " + std::to_string(setup.scene->objects.count) + " objects" +
                    (instance_.validates() ? ", with the validation layers" : ""));
+        if (settings_.view != View::picture && renderer_->state_size() == 0)
+            throw arhost::Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                                  "option 'show': images of this scene are not denoised; only 'picture' is possible");
+        if (settings_.denoise && setup.scene->integrator == ARHOST_INTEGRATOR_PATH && renderer_->state_size() == 0)
+            host_.info("images are not denoised: the scene has too many objects, or the images too many pixels");
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
-        // An older host's struct lacks the field.
-        const bool has_video = request.struct_size > offsetof(arhost_render_request, video);
-        const Rectangle drawn = renderer_->render(request.camera, image, request.motion,
-                                                  has_video ? request.video : nullptr, request.sequence);
+        // An older host's struct lacks fields.
+        const auto has = [&](std::size_t field) { return request.struct_size > field; };
+        const arhost_frame *video = has(offsetof(arhost_render_request, video)) ? request.video : nullptr;
+        LayerDenoiser::StateSlots state; // none: images are not denoised
+        if (has(offsetof(arhost_render_request, state_size)) && request.state_size > 0) {
+            if (request.state_size < renderer_->state_size())
+                throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                                      "the state has " + std::to_string(request.state_size) +
+                                          " bytes; the host must provide as many as state_size() returns, " +
+                                          std::to_string(renderer_->state_size()));
+            state = {request.state_before, request.state_after};
+        }
+        const Rectangle drawn =
+            renderer_->render(request.camera, image, request.motion, video, request.sequence, state);
         info.has_region = 1;
         info.region_x = drawn.x;
         info.region_y = drawn.y;
@@ -113,6 +139,8 @@ public:
         else
             renderer_->set_light_samples(static_cast<std::uint32_t>(changed.integer("light_samples")));
     }
+
+    std::uint64_t state_size() const { return renderer_->state_size(); }
 
     void stop() {
         if (const std::uint64_t count = renderer_->image_count(); count && renderer_->gpu_ms() > 0) {
@@ -177,8 +205,9 @@ constexpr arhost_option_descriptor options[] = {
         "structures; 'auto': on a GPU the first of 'pipeline', 'query' and 'plain' that works, on a CPU 'plain'.",
         0, 0, paths),
     arhost::option(ARHOST_OPTION_TEXT, "quality", "realtime",
-                   "'realtime': 1 sample per pixel; 'balanced': 4; 'reference': 64.", 0, 0,
-                   arhost::raytracer_common::qualities),
+                   "'realtime': 1 sample per pixel; 'balanced': 4; 'reference': 64. The path integrator denoises the "
+                   "first two, with the light of earlier frames.",
+                   0, 0, arhost::raytracer_common::qualities),
     arhost::option(ARHOST_OPTION_INTEGER, "samples", "0",
                    "Primary rays per pixel, evenly spread over the pixel; 0: as many as 'quality' says.", 0,
                    max_samples),
@@ -186,7 +215,8 @@ constexpr arhost_option_descriptor options[] = {
                    "Shadow rays from each shaded point to each area light and to the environment.", 1, 256),
     arhost::option(
         ARHOST_OPTION_BOOL, "accumulate", "false",
-        "Average over frames while the camera and scene are static; each image then depends on earlier frames."),
+        "Average over frames while the camera and scene are static, instead of denoising; each image then depends on "
+        "earlier frames."),
     arhost::option(ARHOST_OPTION_TEXT, "glass", "tree",
                    "Rays traced at glass; 'tree': both the reflected and the refracted ray; 'path': one of them, "
                    "chosen at random.",
@@ -199,6 +229,13 @@ constexpr arhost_option_descriptor options[] = {
                    "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
                    "0: none.",
                    0, arhost::raytracer_common::max_photons),
+    arhost::option(
+        ARHOST_OPTION_TEXT, "show", "picture",
+        "What images show: the picture, or a part of it for inspection. Of the change of a catcher's light: "
+        "'shadow' (grey: none), 'bounce' or 'caustics'. Of the denoiser: the length of the 'history' (white: "
+        "32 frames), the standard deviation that is left ('variance'; white: 0.1), or 'normals'.",
+        0, 0, views),
+    arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Threads of the denoiser; 0: one per processor.", 0, 256),
     arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
                    "Enable Vulkan's validation layers and log their messages; slow.")};
 

@@ -20,7 +20,7 @@ namespace rt_vulkan {
 namespace {
 
 using arhost::Failure;
-using arhost::raytracer_common::Photon, arhost::raytracer_common::PhotonMap;
+using arhost::raytracer_common::Photon, arhost::raytracer_common::PhotonMap, arhost::raytracer_common::Denoising;
 using arhost::raytracer_common::photon_count, arhost::raytracer_common::max_photons;
 
 static_assert(Bands::unit % group_side == 0); // a work group never covers two bands
@@ -121,6 +121,30 @@ std::size_t write_photons(const PhotonMap &map, std::span<std::byte> to, Frame &
     return size;
 }
 
+// Returns a rectangle from its corners; an empty one if x1 <= x0.
+Rectangle rectangle_of(std::int32_t x0, std::int32_t y0, std::int32_t x1, std::int32_t y1) {
+    if (x0 >= x1)
+        return {};
+    return {static_cast<std::uint32_t>(x0), static_cast<std::uint32_t>(y0), static_cast<std::uint32_t>(x1 - x0),
+            static_cast<std::uint32_t>(y1 - y0)};
+}
+
+// Returns Frame::shown_parts.
+std::uint32_t shown_parts(arhost::raytracer_common::View view) {
+    using arhost::raytracer_common::View;
+    constexpr std::uint32_t shadow = 1, bounce = 2, caustics = 4; // as in shaders/path_catcher.glsl
+    switch (view) {
+    case View::shadow:
+        return shadow;
+    case View::bounce:
+        return bounce;
+    case View::caustics:
+        return caustics;
+    default:
+        return shadow | bounce | caustics;
+    }
+}
+
 // Reports progress to the host while the driver works, so that the host does not assume a hang. Stops reporting after
 // a timeout, because the driver itself may hang.
 class Heartbeat {
@@ -153,7 +177,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
       scene_(setup, shaders.path == Path::plain, host),
       samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       bands_(intrinsics_.height, settings.max_band_time.value_or(max_band_time(physical))),
-      photon_bands_(photon_rows(max_photons), settings.max_band_time.value_or(max_band_time(physical))) {
+      photon_bands_(photon_rows(max_photons), settings.max_band_time.value_or(max_band_time(physical))),
+      tap_bands_(intrinsics_.height, settings.max_band_time.value_or(max_band_time(physical))) {
     if (!is_path_ || !scene_.may_have_photons())
         settings_.photons = 0;
     frame_ = scene_.frame();
@@ -165,7 +190,12 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     frame_.max_radiance = settings.max_radiance;
     frame_.is_linear = is_linear(setup);
     frame_.blends_codes = setup.compositing != ARHOST_COMPOSITING_LINEAR;
+    frame_.shown_parts = shown_parts(settings.view);
     set_lens();
+    if (settings.denoise && is_path_ && setup.scene->objects.count <= Denoising::most_objects &&
+        layers_size() <= physical.properties.limits.maxStorageBufferRange)
+        denoiser_.emplace(intrinsics_, setup.scene->objects.count, scene_.has_catchers(), scene_.has_gloss(),
+                          scene_.has_specular(), settings.view, settings.denoiser_threads);
     make_buffers(shaders.path);
     if (shaders.path != Path::plain) {
         const Heartbeat heartbeat(host_, "building acceleration structures");
@@ -194,6 +224,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     record_preparation(preparation_);
     submission_.end(preparation_);
     photon_commands_ = submission_.new_commands();
+    layer_commands_ = submission_.new_commands();
     scene_.release_static_parts();
 }
 
@@ -266,6 +297,12 @@ void Renderer::update_descriptor_set() {
         target.recorded = {}; // the update of the descriptor set invalidates the commands
 }
 
+// Returns the size of the planes that the denoiser reads, in bytes.
+std::size_t Renderer::layers_size() const {
+    return sizeof(std::uint32_t) * LayerDenoiser::plane_count(scene_.has_gloss()) * intrinsics_.width *
+           intrinsics_.height;
+}
+
 void Renderer::make_buffers(Path path) {
     const std::size_t pixels = std::size_t{intrinsics_.width} * intrinsics_.height;
     std::size_t moving_size = 0;
@@ -279,7 +316,11 @@ void Renderer::make_buffers(Path path) {
     make_rays(settings_.samples > 1 || settings_.accumulate || is_path_);
     make_photon_buffers(settings_.samples);
     buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? sizeof(Sums) * pixels : 0);
-    buffers_[image_binding] = make_buffer(image_binding, {}, pixel_size_ * pixels);
+    const std::size_t image_size = pixel_size_ * pixels;
+    buffers_[image_binding] =
+        make_buffer(image_binding, {}, denoiser_ ? std::max(image_size, layers_size()) : image_size);
+    if (denoiser_)
+        layers_ = Buffer(device_, layers_size(), VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
     buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
     buffers_[frame_binding] =
         Buffer(device_, sizeof(Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, Buffer::Place::host_written);
@@ -355,13 +396,14 @@ void Renderer::write_descriptor_set() {
 }
 
 void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
-    // If glass spawns two rays, up to one ray per depth waits on the stack. With the path integrator, glass spawns
-    // two rays at the first hit only, and so do glossy catchers.
+    // If glass spawns two rays, up to one ray per depth waits on the stack. With the path integrator, glossy catchers
+    // spawn two rays at the first hit only, and so does glass, unless images are denoised.
     const bool mirrors = is_path_ && scene_.has_gloss();
     const bool branches = mirrors || (scene_.has_glass() && (is_path_ || !settings_.single_path));
-    const Specialization constants{!branches  ? 1
-                                   : is_path_ ? 2
-                                              : static_cast<std::int32_t>(max_depth) + 1,
+    const Specialization constants{!branches ? 1
+                                   : is_path_ && !(denoiser_ && scene_.has_glass())
+                                       ? 2
+                                       : std::max(2, static_cast<std::int32_t>(max_depth) + 1),
                                    scene_.has_glass(),
                                    scene_.has_catchers(),
                                    scene_.has_holes(),
@@ -370,21 +412,26 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    scene_.has_area_lights(),
                                    scene_.video_size() > 0,
                                    mirrors,
-                                   settings_.photons > 0};
+                                   settings_.photons > 0,
+                                   denoiser_.has_value()};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
     if (settings_.photons > 0)
         photon_pipeline_.emplace(device_, photon_shaders_of(shaders.path), layout_.get(), constants);
+    if (denoiser_)
+        tap_pipeline_.emplace(device_, tap_shaders_of(shaders.path), layout_.get(), constants);
     // Lavapipe compiles a shader when it is first dispatched. Therefore this runs the shaders once for a frame of
     // width 0 and without photons, which traces nothing.
     const VkCommandBuffer commands = submission_.new_commands();
     std::memset(buffers_[frame_binding].mapped().data(), 0, sizeof(Frame));
     submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
     pipeline_->record(commands, set_, 1, {0, 1});
-    if (photon_pipeline_) {
-        barrier(device_.functions(), commands, stage_, VK_ACCESS_SHADER_READ_BIT, stage_, VK_ACCESS_SHADER_WRITE_BIT);
-        photon_pipeline_->record(commands, set_, 1, {0, 1});
-    }
+    for (const auto *other : {&photon_pipeline_, &tap_pipeline_})
+        if (*other) {
+            barrier(device_.functions(), commands, stage_, VK_ACCESS_SHADER_READ_BIT, stage_,
+                    VK_ACCESS_SHADER_WRITE_BIT);
+            (*other)->record(commands, set_, 1, {0, 1});
+        }
     submission_.end(commands);
     submission_.run(commands);
     submission_.free(commands);
@@ -429,7 +476,7 @@ void Renderer::record(Target &target, Rows rows) const {
                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
     pipeline_->record(target.commands, set_, intrinsics_.width, rows);
     if (rows.first + rows.count == intrinsics_.height)
-        record_copy(target);
+        record_copy(target.commands, target.buffer, rows_of(target));
     submission_.end(target.commands);
     target.recorded = rows;
 }
@@ -456,23 +503,41 @@ void Renderer::record_preparation(VkCommandBuffer commands) const {
             VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
 }
 
-void Renderer::record_copy(const Target &target) const {
+// Records commands that write rows of the denoiser's layers: with `pipeline_` all but the taps, with `tap_pipeline_`
+// these. The last ones also copy the layers to the host.
+VkCommandBuffer Renderer::record_layers(const ImagePipeline &pipeline, Rows rows) const {
+    submission_.begin(layer_commands_);
+    barrier(device_.functions(), layer_commands_, stage_, VK_ACCESS_SHADER_WRITE_BIT, stage_,
+            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+    pipeline.record(layer_commands_, set_, intrinsics_.width, rows);
+    const VkBufferCopy all{0, 0, layers_.size()};
+    if (&pipeline == &*tap_pipeline_ && rows.first + rows.count == intrinsics_.height)
+        record_copy(layer_commands_, layers_, {&all, 1});
+    submission_.end(layer_commands_);
+    return layer_commands_;
+}
+
+// Returns the parts of an image that are copied to its target. If the target has padding at the end of rows, copies
+// row by row: the padding must not be overwritten.
+std::vector<VkBufferCopy> Renderer::rows_of(const Target &target) const {
+    const VkDeviceSize row = VkDeviceSize{pixel_size_} * intrinsics_.width;
+    if (target.stride == row)
+        return {{0, 0, row * intrinsics_.height}};
+    std::vector<VkBufferCopy> rows;
+    for (std::uint32_t y = 0; y < intrinsics_.height; ++y)
+        rows.push_back({row * y, VkDeviceSize{target.stride} * y, row});
+    return rows;
+}
+
+// Records commands that copy parts of the image's buffer, and the bounding rectangle of drawn pixels, to the host.
+void Renderer::record_copy(VkCommandBuffer commands, const Buffer &to, std::span<const VkBufferCopy> regions) const {
     const VolkDeviceTable &vk = device_.functions();
-    const VkCommandBuffer commands = target.commands;
     barrier(vk, commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
             VK_ACCESS_TRANSFER_READ_BIT);
     if (timestamps_.get())
         vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), traced);
-    // If the image has padding at the end of rows, copies row by row: the padding must not be overwritten.
-    const VkDeviceSize row = VkDeviceSize{pixel_size_} * intrinsics_.width;
-    std::vector<VkBufferCopy> rows;
-    if (target.stride == row)
-        rows.push_back({0, 0, row * intrinsics_.height});
-    else
-        for (std::uint32_t y = 0; y < intrinsics_.height; ++y)
-            rows.push_back({row * y, VkDeviceSize{target.stride} * y, row});
-    vk.vkCmdCopyBuffer(commands, buffers_[image_binding].get(), target.buffer.get(),
-                       static_cast<std::uint32_t>(rows.size()), rows.data());
+    vk.vkCmdCopyBuffer(commands, buffers_[image_binding].get(), to.get(), static_cast<std::uint32_t>(regions.size()),
+                       regions.data());
     const VkBufferCopy drawn{0, 0, drawn_size};
     vk.vkCmdCopyBuffer(commands, buffers_[drawn_binding].get(), drawn_.get(), 1, &drawn);
     barrier(vk, commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
@@ -547,7 +612,8 @@ void Renderer::set_video(const arhost_frame *video) {
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion,
-                           const arhost_frame *video, std::uint64_t sequence) {
+                           const arhost_frame *video, std::uint64_t sequence,
+                           const LayerDenoiser::StateSlots &state) {
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
     if (!image.linear == (frame_.is_linear != 0))
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the image buffer must have the form passed to start");
@@ -556,7 +622,6 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                       "the image buffer's stride must be a multiple of 4 bytes");
     if (host_.cancelled()) // checked before the scene is updated
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled before tracing the image");
-    Target &target = target_for(image);
     set_camera(camera, frame_);
     std::vector<VkCommandBuffer> commands;
     if (start_timestamps_)
@@ -592,20 +657,56 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         frame_.samples[i][1] = samples_[i].y;
     }
 
+    const bool denoises = denoiser_ && state.after;
+    frame_.denoises = denoises;
+    if (denoises)
+        begin_denoising(state, image, motion, sequence);
     arhost::raytracer_common::SlowImage slow_image(host_);
     trace_photons(commands, [&](double) { slow_image.report(0); });
     write_frame();
+    const auto report = [&](double fraction) { slow_image.report(fraction); };
+    if (denoises) {
+        trace(
+            std::move(commands), intrinsics_.height, bands_,
+            [&](Rows rows) { return record_layers(*pipeline_, rows); }, report);
+        check_cancelled();
+        trace(
+            {}, intrinsics_.height, tap_bands_, [&](Rows rows) { return record_layers(*tap_pipeline_, rows); },
+            [&](double) { report(1); });
+        check_cancelled();
+        read_timestamps();
+        const auto drawn = denoiser_->run(reinterpret_cast<const std::uint32_t *>(layers_.mapped().data()));
+        return rectangle_of(drawn.x0, drawn.y0, drawn.x1, drawn.y1);
+    }
+    Target &target = target_for(image);
     const auto commands_of = [&](Rows rows) {
         record(target, rows);
         return target.commands;
     };
-    trace(std::move(commands), intrinsics_.height, bands_, commands_of,
-          [&](double fraction) { slow_image.report(fraction); });
+    trace(std::move(commands), intrinsics_.height, bands_, commands_of, report);
     if (settings_.accumulate) {
         history_samples_ += frame_.sample_count;
         history_camera_ = camera;
     }
     return read_back(target, image);
+}
+
+void Renderer::begin_denoising(const LayerDenoiser::StateSlots &state, const arhost_image &image,
+                               const arhost_motion *motion, std::uint64_t sequence) {
+    arhost::raytracer_common::Camera camera;
+    std::copy_n(frame_.eye, 3, camera.eye);
+    for (std::size_t i = 0; i < 3; ++i)
+        std::copy_n(frame_.world_from_camera[i], 3, camera.world_from_camera + 3 * i);
+    const Denoising &denoising = denoiser_->begin(state, {.camera = camera,
+                                                          .video = frame_.has_video ? &video_image_ : nullptr,
+                                                          .image = image,
+                                                          .blends_codes = frame_.blends_codes != 0,
+                                                          .objects = scene_.placed_objects(),
+                                                          .deforms = motion && motion->deformed_count > 0,
+                                                          .sequence = static_cast<std::uint32_t>(sequence),
+                                                          .samples = full_samples_});
+    frame_.seen_moves = denoising.seen_moves();
+    frame_.pixel_angle = denoising.pixel_angle;
 }
 
 void Renderer::check_cancelled() const {
@@ -667,6 +768,14 @@ Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {
             std::memcpy(pixels_of(image) + std::size_t{image.stride} * y,
                         target.buffer.mapped().data() + std::size_t{target.stride} * y, target.stride);
     read_back_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+    read_timestamps();
+    std::int32_t drawn[4];
+    std::memcpy(drawn, drawn_.mapped().data(), sizeof drawn);
+    return rectangle_of(drawn[0], drawn[1], drawn[2], drawn[3]);
+}
+
+// Reads the GPU times of an image, and counts it.
+void Renderer::read_timestamps() {
     ++image_count_;
     last_gpu_ns_ = 0;
     std::uint64_t ticks[timestamp_count];
@@ -684,12 +793,6 @@ Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {
         gpu_ms_ += gpu_ms;
         read_back_ms_ += ms_since(traced);
     }
-    std::int32_t drawn[4];
-    std::memcpy(drawn, drawn_.mapped().data(), sizeof drawn);
-    if (drawn[0] >= drawn[2])
-        return {};
-    return {static_cast<std::uint32_t>(drawn[0]), static_cast<std::uint32_t>(drawn[1]),
-            static_cast<std::uint32_t>(drawn[2] - drawn[0]), static_cast<std::uint32_t>(drawn[3] - drawn[1])};
 }
 
 } // namespace rt_vulkan

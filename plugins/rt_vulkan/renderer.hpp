@@ -8,6 +8,7 @@
 #include "bands.hpp"
 #include "camera_data.hpp"
 #include "image_pipeline.hpp"
+#include "layer_denoiser.hpp"
 #include "raytracer_common/photon_map.hpp"
 #include "raytracer_common/samples.hpp"
 #include "raytracer_common/video.hpp"
@@ -20,12 +21,15 @@
 namespace rt_vulkan {
 
 struct Settings {
-    std::uint32_t samples = 1;                        // per pixel
-    std::uint32_t light_samples = 4;                  // per shaded point and area light, environment or background
-    bool accumulate = false;                          // average over frames while the camera and scene are static
-    bool single_path = false;                         // glass spawns one random ray instead of two
-    float max_radiance = 100;                         // path integrator: bound of each sample; infinity: none
-    std::uint32_t photons = 16384;                    // path integrator: per frame and sample
+    std::uint32_t samples = 1;       // per pixel
+    std::uint32_t light_samples = 4; // per shaded point and area light, environment or background
+    bool accumulate = false;         // average over frames while the camera and scene are static
+    bool single_path = false;        // glass spawns one random ray instead of two
+    float max_radiance = 100;        // path integrator: bound of each sample; infinity: none
+    std::uint32_t photons = 16384;   // path integrator: per frame and sample
+    bool denoise = false;            // path integrator
+    arhost::raytracer_common::View view = arhost::raytracer_common::View::picture; // else it needs `denoise`
+    unsigned denoiser_threads = 0;                                                 // 0: one per processor
     std::optional<Bands::Milliseconds> max_band_time; // set by tests only; the default depends on the device
 };
 
@@ -40,9 +44,12 @@ public:
 
     // Returns a rectangle that contains all pixels that virtual objects affect; its width is 0 if there are none.
     // `motion` is NULL if nothing has moved since the last call, `video` if the frame under the overlay is unknown.
-    // `sequence`: number of the frame, for the random numbers of the path integrator.
+    // `sequence`: number of the frame, for the random numbers of the path integrator. `state`: of state_size() bytes;
+    // without it, there is no denoising.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr,
-                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0);
+                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0,
+                     const LayerDenoiser::StateSlots &state = {});
+    std::uint64_t state_size() const { return denoiser_ ? denoiser_->state_size() : 0; }
 
     // Both functions change the images of later calls as if the renderer had been created with the new setting.
     // `full_samples`: number of samples of an image without a limit (arhost_render_request.max_samples).
@@ -75,6 +82,7 @@ private:
     };
     void make_rays(bool has_slopes);
     bool make_photon_buffers(std::uint32_t samples);
+    std::size_t layers_size() const;
     void update_descriptor_set();
     void make_buffers(Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t min_size,
@@ -87,7 +95,9 @@ private:
     Target &target_for(const arhost_image &image);
     void record(Target &target, Rows rows) const;
     void record_preparation(VkCommandBuffer commands) const;
-    void record_copy(const Target &target) const;
+    VkCommandBuffer record_layers(const ImagePipeline &pipeline, Rows rows) const;
+    void record_copy(VkCommandBuffer commands, const Buffer &to, std::span<const VkBufferCopy> regions) const;
+    std::vector<VkBufferCopy> rows_of(const Target &target) const;
     void record_photons(Rows rows, bool is_last) const;
     void record_photon_map(std::size_t size) const;
     void check_cancelled() const;
@@ -98,7 +108,10 @@ private:
     void write_moving_parts();
     void set_lens();
     void set_video(const arhost_frame *video);
+    void begin_denoising(const LayerDenoiser::StateSlots &state, const arhost_image &image,
+                         const arhost_motion *motion, std::uint64_t sequence);
     Rectangle read_back(const Target &target, const arhost_image &image);
+    void read_timestamps();
 
     arhost::Host host_;
     Settings settings_;
@@ -116,20 +129,24 @@ private:
     std::array<Buffer, binding_count> buffers_;
     Buffer moving_; // staging buffer for the moving parts of all buffers
     arhost::raytracer_common::VideoImage video_image_;
-    Buffer video_;   // staging buffer for the video; empty if no image has one
-    Buffer drawn_;   // bounding rectangle of the drawn pixels, for the host
-    Buffer photons_; // of the last image, for the host; empty without caustics
+    Buffer video_;                          // staging buffer for the video; empty if no image has one
+    Buffer drawn_;                          // bounding rectangle of the drawn pixels, for the host
+    Buffer photons_;                        // of the last image, for the host; empty without caustics
+    std::optional<LayerDenoiser> denoiser_; // empty without denoising
+    Buffer layers_;                         // of the last denoised image, for the host
     arhost::raytracer_common::PhotonMap photon_map_;
     std::optional<AccelerationStructures> structures_; // empty on the path `plain`
     QueryPool timestamps_;                             // empty if unsupported
     VkCommandBuffer start_timestamps_ = VK_NULL_HANDLE, preparation_ = VK_NULL_HANDLE,
-                    photon_commands_ = VK_NULL_HANDLE;
-    Bands bands_, photon_bands_;
+                    photon_commands_ = VK_NULL_HANDLE, layer_commands_ = VK_NULL_HANDLE;
+    Bands bands_, photon_bands_, tap_bands_;
     DescriptorSetLayout set_layout_;
     DescriptorPool pool_;
     VkDescriptorSet set_ = VK_NULL_HANDLE;
     PipelineLayout layout_;
-    std::optional<ImagePipeline> pipeline_, photon_pipeline_; // photon_pipeline_: empty without caustics
+    std::optional<ImagePipeline> pipeline_;
+    std::optional<ImagePipeline> photon_pipeline_; // empty without caustics
+    std::optional<ImagePipeline> tap_pipeline_;    // empty without denoising
     std::vector<Target> targets_;
     bool imports_ = true; // false once an import of host memory has failed
     bool wrote_in_place_ = false;

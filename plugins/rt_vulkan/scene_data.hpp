@@ -59,12 +59,17 @@ public:
     void write_lights(Frame &frame) const;
     const arhost::raytracer_common::LightSources &lights() const { return *light_sources_; } // path integrator only
     const arhost::raytracer_common::PhotonTargets &photon_targets() const { return photon_targets_; }
+    // One per object. Path integrator only.
+    std::span<const arhost::raytracer_common::PlacedObject> placed_objects() const { return placed_; }
     const arhost_environment &environment() const { return arena_.environment; }
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
     bool has_holes() const { return has_holes_; }
     bool has_gloss() const { return has_gloss_; } // whether a catcher may mirror
     bool has_area_lights() const { return has_area_lights_; }
+    bool has_specular() const {
+        return has_specular_;
+    } // virtual objects that reflect or refract like mirrors or glass
     bool may_have_photons() const { return has_specular_ && arena_.lights.count > 0; } // path integrator only
     bool has_textures() const { return arena_.textures.count > 0; }                    // including the environment
 

@@ -101,7 +101,8 @@ std::string difference_from_plain(const arhost_raytracer_setup &setup, const Set
     small.intrinsics = &intrinsics;
     Settings once = settings;
     once.samples = once.light_samples = 1;
-    once.accumulate = false;
+    once.accumulate = once.denoise = false;
+    once.view = arhost::raytracer_common::View::picture;
     const arhost_camera camera = camera_for(box, setup.scene->axes, intrinsics);
 
     const Pixels got = picture_by(shaders, small, once, host, physical, camera);

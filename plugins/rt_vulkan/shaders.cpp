@@ -8,12 +8,15 @@
 #include "spirv/pipeline.rmiss.h"
 #include "spirv/pipeline_path.rgen.h"
 #include "spirv/pipeline_photons.rgen.h"
+#include "spirv/pipeline_taps.rgen.h"
 #include "spirv/plain.comp.h"
 #include "spirv/plain_path.comp.h"
 #include "spirv/plain_photons.comp.h"
+#include "spirv/plain_taps.comp.h"
 #include "spirv/query.comp.h"
 #include "spirv/query_path.comp.h"
 #include "spirv/query_photons.comp.h"
+#include "spirv/query_taps.comp.h"
 
 namespace rt_vulkan {
 
@@ -50,6 +53,14 @@ Shaders photon_shaders_of(Path path) {
     shaders.stages[0].words = path == Path::plain   ? Words(plain_photons_comp)
                               : path == Path::query ? Words(query_photons_comp)
                                                     : Words(pipeline_photons_rgen);
+    return shaders;
+}
+
+Shaders tap_shaders_of(Path path) {
+    Shaders shaders = shaders_of(path);
+    shaders.stages[0].words = path == Path::plain   ? Words(plain_taps_comp)
+                              : path == Path::query ? Words(query_taps_comp)
+                                                    : Words(pipeline_taps_rgen);
     return shaders;
 }
 

@@ -28,5 +28,6 @@ struct Shaders {
 
 Shaders shaders_of(Path path, arhost_integrator integrator = ARHOST_INTEGRATOR_WHITTED);
 Shaders photon_shaders_of(Path path);
+Shaders tap_shaders_of(Path path);
 
 } // namespace rt_vulkan

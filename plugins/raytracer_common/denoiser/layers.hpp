@@ -10,8 +10,10 @@
 
 namespace arhost::raytracer_common {
 
-// The content of an image: values of the option `show`, in the order of plugin.cpp.
+// The content of an image, and the values of the option `show` in the same order.
 enum class View : std::int32_t { picture, shadow, bounce, caustics, history, variance, normals };
+inline constexpr const char *views[] = {"picture", "shadow",   "bounce",  "caustics",
+                                        "history", "variance", "normals", nullptr};
 
 // Kinds of surfaces.
 enum SurfaceKind : std::int32_t {

@@ -15,7 +15,7 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
     vec3 light = vec3(0.0);
     stack_size = 0;
     int stage = PRIMARY_STAGE;
-    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE);
+    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE, false);
     Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
     for (;;) {
         Hit hit = trace(ray, false, stage == CATCHER_STAGE);

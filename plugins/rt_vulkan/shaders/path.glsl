@@ -7,43 +7,81 @@
 // Paths of fewer bounces are not ended at random.
 const uint first_roulette_depth = 2u;
 
-const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
+const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3, NEAR_CENTRE_STAGE = 4;
 
 // The surfaces that receive the light of sampled light sources.
 const int LIT_SURFACE = 1, CATCHER_SURFACE = 2, FILMED_SURFACE = 3;
 
-// Ends paths at random, so that those that go on have about the same throughput.
-bool survives(uint depth, Random random, inout vec3 throughput) {
-    if (!(largest(throughput) > 0.0))
-        return false;
-    if (depth < first_roulette_depth)
-        return true;
-    float chance = clamp(largest(throughput), 0.05, 1.0);
-    throughput *= 1.0 / chance;
-    return path_pair(random, ROULETTE_DIMENSION, 0u, 1u).x < chance;
+// Bounds a sample, so that a single random ray that hits a tiny, very bright light does not dominate the pixel.
+float bounded(float value) {
+    return abs(value) < 1e30 ? clamp(value, -frame.max_radiance, frame.max_radiance) : 0.0; // NaN: 0
+}
+vec3 bounded(vec3 rgb) {
+    return vec3(bounded(rgb.x), bounded(rgb.y), bounded(rgb.z));
 }
 
-// Pushes a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
+// Returns whether a path from the eye has been scattered only by mirrors and glass, and by no random choice.
+bool is_seen(Path path) {
+    return is_denoised() && !path.is_random && path.inverse_density == 0.0 && path.plane == OBJECT_PLANE;
+}
+
+// A sum over the samples of a pixel: the light of lamps, of the environment and of the video that mirrors and glass show,
+// and the albedo of virtual objects that they show. Only paths with is_seen() count.
+vec3 seen;
+
+void add_seen(Path path, vec3 light) {
+    if (path.depth > 0u && is_seen(path))
+        seen += max(bounded(path.throughput * light), 0.0);
+}
+
+// Light that is seen in mirrors and through glass should have no noise.
+float importance_of(Path path) {
+    return is_seen(path) ? 16.0 : 1.0;
+}
+
+// Ends paths at random, so that those that go on have about the same throughput, 1 / importance. `choice`: 0 to 1.
+bool survives(inout Path path, float importance, float choice, inout vec3 throughput) {
+    if (!(largest(throughput) > 0.0))
+        return false;
+    if (path.depth < first_roulette_depth)
+        return true;
+    float chance = clamp(largest(throughput) * importance, 0.05, 1.0);
+    throughput *= 1.0 / chance;
+    path.is_random = path.is_random || chance < 1.0;
+    return choice < chance;
+}
+vec2 roulette_pair(Path path, Random random) {
+    return path.depth < first_roulette_depth ? vec2(0.0) : path_pair(random, ROULETTE_DIMENSION, 0u, 1u);
+}
+
+// Pushes a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly, and
+// for the denoiser where glass is seen.
 void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, float choice, Random random) {
     vec2 uv = materials[material].roughness > 0.0 ? path_pair(random, FACET_DIMENSION, 0u, 1u) : vec2(0.0);
+    path.is_random = path.is_random || materials[material].roughness > 0.0;
     GlassScatter glass = scatter_at_glass(s, direction, material, uv);
     vec3 arriving = path.throughput * glass.transmittance;
     vec3 by_reflection = arriving * materials[material].reflectivity * glass.unmasked_reflected,
          by_refraction = arriving * materials[material].refraction * glass.unmasked_refracted;
     bool reflects = choice < glass.reflectance, refracts = !reflects;
-    if (path.depth == 0u) {
+    float importance = importance_of(path);
+    bool is_both = path.depth == 0u || importance > 1.0;
+    if (is_both) {
         by_reflection *= glass.reflectance;
         by_refraction *= 1.0 - glass.reflectance;
         reflects = true;
         refracts = glass.reflectance < 1.0;
     }
-    if (reflects && survives(path.depth, random, by_reflection))
-        push(path, above(s), glass.reflected, by_reflection, -abs(path.inverse_density));
-    if (refracts && survives(path.depth, random, by_refraction))
-        push(path, below(s), glass.refracted, by_refraction, -abs(path.inverse_density));
+    vec2 roulette = roulette_pair(path, random);
+    Path next = path;
+    if (reflects && survives(next, importance, roulette.x, by_reflection))
+        push(next, above(s), glass.reflected, by_reflection, -abs(path.inverse_density));
+    next = path;
+    if (refracts && survives(next, importance, is_both ? roulette.y : roulette.x, by_refraction))
+        push(next, below(s), glass.refracted, by_refraction, -abs(path.inverse_density));
 }
 
-// Pushes a ray that the surface scatters; in glass at the first hit, two rays.
+// Pushes a ray that the surface scatters; in glass, there may be two.
 void scatter_path(Path path, Surface s, vec3 direction, uint material, Random random) {
     vec2 choice = path_pair(random, CHOICE_DIMENSION, 0u, 1u);
     if (has_glass && materials[material].model == GLASS) {
@@ -54,7 +92,8 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
     float mirror_chance = mirror_chance_of(s, direction, material, mirror_reflectance);
     if (choice.y < mirror_chance) {
         vec3 throughput = path.throughput * mirror_reflectance * (1.0 / max(mirror_chance, 1e-6));
-        if (survives(path.depth, random, throughput))
+        path.is_random = path.is_random || mirror_chance < 1.0;
+        if (survives(path, importance_of(path), roulette_pair(path, random).x, throughput))
             push(path, above(s), reflected(s, direction), throughput, -abs(path.inverse_density));
         return;
     }
@@ -68,7 +107,7 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
     vec3 throughput = path.throughput * scattering(s, to_eye, to) *
                       (0.318309886 / max(density * (1.0 - mirror_chance), 1e-20));
     if (dot(to, s.normal) > 0.0 && dot(to, s.geometric_normal) > 0.0 && density > 0.0 &&
-        survives(path.depth, random, throughput))
+        survives(path, 1.0, roulette_pair(path, random).x, throughput))
         push(path, above(s), to, throughput, 1.0 / max(density, 1e-30));
 }
 
@@ -122,17 +161,14 @@ vec3 sampled_light(int receiver, Surface s, float form_factors, vec3 to_eye, uin
     return sum;
 }
 
+// The denoiser leaves bright single paths visible for many frames. So surfaces have wider highlights where another
+// surface, but a mirror or glass, scatters their light (A. Kaplanyan and C. Dachsbacher, Path Space Regularization
+// for Holistic and Robust Light Transport, Eurographics 2013).
+const float LEAST_SCATTERED_ALPHA = 0.3;
+
 // Reciprocal of a real surface's irradiance without virtual objects.
 float reciprocal(float irradiance) {
     return frame.least_irradiance > 0.0 ? 1.0 / max(irradiance, frame.least_irradiance) : 0.0;
-}
-
-// Bounds a sample, so that a single random ray that hits a tiny, very bright light does not dominate the pixel.
-float bounded(float value) {
-    return abs(value) < 1e30 ? clamp(value, -frame.max_radiance, frame.max_radiance) : 0.0; // NaN: 0
-}
-vec3 bounded(vec3 rgb) {
-    return vec3(bounded(rgb.x), bounded(rgb.y), bounded(rgb.z));
 }
 
 // Returns the light that a ray brings to its origin, without that of the rays it pushes. `is_bounce`: the ray comes from
@@ -172,11 +208,13 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
         if (is_filmed && (frame.has_several_real != 0u || !is_hit)) // the video may show a nearer real surface
             is_filmed = trace(Ray(frame.eye, to_point, end, CATCHER_MASK | OCCLUDER_MASK), true, false).object == NONE;
     }
-    if (!is_hit)
-        return sum + (is_filmed ? video
-                                : arriving_from_environment(ray.direction, path.inverse_density,
-                                                            frame.environment_chance *
-                                                                float(source_samples(path.depth - 1u))));
+    if (!is_hit) {
+        sum += is_filmed ? video
+                         : arriving_from_environment(ray.direction, path.inverse_density,
+                                                     frame.environment_chance * float(source_samples(path.depth - 1u)));
+        add_seen(path, sum);
+        return sum;
+    }
     if (is_covered && is_filmed)
         return sum + video;
     vec3 direction = normalize(ray.direction);
@@ -187,6 +225,20 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     vec3 relative = vec3(1.0), before = vec3(0.0); // relative: factor of the reflected light
     if (is_lit && (receiver != CATCHER_SURFACE || has_gloss))
         add_material(s, hit);
+    if (is_denoised()) {
+        if (path.inverse_density != 0.0)
+            s.alpha = max(s.alpha, LEAST_SCATTERED_ALPHA);
+        if (path.depth == 0u && kind_of(guides.surface) != SPECULAR_SURFACE) {
+            guides.position = s.position;
+            guides.normal = s.normal;
+            guides.albedo = divisor_of(s);
+        }
+        bool is_emissive = receiver == LIT_SURFACE && largest(s.emission) > 0.0;
+        add_seen(path, sum + (receiver == FILMED_SURFACE ? video
+                              : is_emissive              ? s.emission
+                              : is_lit                   ? divisor_of(s)
+                                                         : vec3(0.0)));
+    }
     if (receiver != LIT_SURFACE || is_covered)
         before = irradiance_without_objects(s);
     if (is_covered)
@@ -208,9 +260,14 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     float form_factors = receiver == LIT_SURFACE ? 0.0 : form_factors_of(s);
     vec3 scattered = vec3(0.0);
     if (receiver != LIT_SURFACE || is_lit) {
-        PhotonLight by_photons = photon_light(receiver != LIT_SURFACE, s, -direction, random);
-        scattered = relative * (by_photons.light + sampled_light(receiver, s, form_factors, -direction, path.depth,
-                                                                 scatters, mirrors, random));
+        bool is_caught = receiver == CATCHER_SURFACE;
+        PhotonLight by_photons = PhotonLight(vec3(0.0), vec3(0.0));
+        if (!is_caught || shows(CAUSTICS_PART))
+            by_photons = photon_light(receiver != LIT_SURFACE, s, -direction, random);
+        scattered = by_photons.light;
+        if (!is_caught || shows(SHADOW_PART))
+            scattered += sampled_light(receiver, s, form_factors, -direction, path.depth, scatters, mirrors, random);
+        scattered *= relative;
         if (receiver == CATCHER_SURFACE) // rays of the gloss do not see lamps behind mirrors and glass
             mirrored += by_photons.mirrored;
     }
@@ -221,29 +278,51 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     }
     if (mirrors) // pushed first: when it is popped, the stack has space for the ray behind a virtual object
         push_mirrored(path, s, -direction, random);
-    if (scatters && receiver != LIT_SURFACE && largest(relative) > 0.0)
-        push_bounce(path, s, form_factors, path.throughput * relative, random);
-    else if (scatters && receiver == LIT_SURFACE)
+    if (scatters && receiver != LIT_SURFACE && largest(relative) > 0.0) {
+        if (receiver == FILMED_SURFACE || shows(BOUNCE_PART))
+            push_bounce(path, s, form_factors, path.throughput * relative, random);
+    } else if (scatters && receiver == LIT_SURFACE) {
         scatter_path(path, s, direction, material, random);
+    }
     return sum + scattered;
 }
 
 // Renders a sample and adds it to the pixel's sums. As in the other integrator, a single loop with a single call of
-// trace() handles all kinds of rays that find surfaces.
-void trace_sample(vec3 direction, Random random, inout Sums sums) {
+// trace() handles all kinds of rays that find surfaces. `near`: with denoising, the direction of a ray that mirrors and
+// glass reflect and refract instead, if it meets the same object.
+void trace_sample(vec3 direction, vec3 near, Random random, inout Sums sums) {
     vec3 light = vec3(0.0);
     mirrored = covered = matt = vec3(0.0);
     stack_size = 0;
     int stage = PRIMARY_STAGE;
     bool of_catcher = false;
-    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE);
+    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE, false);
     Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
+    Hit of_centre;
     for (;;) {
         Hit hit = trace(ray, false, stage == CATCHER_STAGE);
+        if (stage == NEAR_CENTRE_STAGE && hit.object != of_centre.object) {
+            hit = of_centre;
+            ray.direction = direction;
+        }
         bool is_hit = hit.object != NONE;
         if (stage == PRIMARY_STAGE) {
             if (is_hit && objects[hit.object].role == VIRTUAL) {
                 sums.coverage += 1.0;
+                if (is_denoised()) {
+                    uint surface = surface_of(hit.object);
+                    bool is_first = guides.surface == 0u;
+                    if (is_first)
+                        guides.surface = surface;
+                    if (kind_of(surface) == SPECULAR_SURFACE) {
+                        if (is_first)
+                            follow_specular(ray, hit);
+                        of_centre = hit;
+                        ray.direction = near;
+                        stage = NEAR_CENTRE_STAGE;
+                        continue;
+                    }
+                }
             } else {
                 if (!has_catchers)
                     return;
@@ -257,6 +336,8 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
                 return;
             of_catcher = true;
             path.plane = CHANGE_PLANE;
+            if (is_denoised())
+                guides.surface = surface_of(hit.object);
         }
         // The light of catchers and filmed surfaces changes only where they see virtual objects.
         bool is_bounce = path.plane >= FILMED_BIT || (stage == PATH_STAGE && path.depth == 1u &&
@@ -315,16 +396,69 @@ uvec2 halves_of(vec3 rgb) {
     return uvec2(half_of(rgb.x) | (half_of(rgb.y) << 16), half_of(rgb.z));
 }
 
+// Pixels that show mirrors and glass get more samples, as what they show has edges. Returns the offset of one: with the
+// last of the others, one in each quarter of the pixel. In motion these are always the same, as jitter would flicker.
+const uint MORE_SAMPLES = 3u;
+vec2 further_offset(uint number) {
+    const vec2 around[MORE_SAMPLES] = vec2[](vec2(0.0, -0.47), vec2(0.41, 0.235), vec2(-0.41, 0.235));
+    if (frame.seen_moves != 0u)
+        return around[number - 1u];
+    vec2 at = frame.samples[frame.sample_count - 1u].xy, further = at - 0.5 * sign(at);
+    return vec2((number & 1u) != 0u ? further.x : at.x, (number & 2u) != 0u ? further.y : at.y);
+}
+
+// Writes the input of the denoiser.
+void write_layers(uint pixel, Sums sums) {
+    bool is_specular = kind_of(guides.surface) == SPECULAR_SURFACE;
+    float count = float(frame.sample_count + (is_specular ? MORE_SAMPLES : 0u));
+    bool is_real = kind_of(guides.surface) == REAL_SURFACE;
+    vec3 light = sums.hidden / count;
+    if (is_real) {
+        guides.albedo = sums.matt / count;
+    } else {
+        if (is_specular)
+            guides.albedo = max(seen / count, LEAST_DIVISOR);
+        light = sums.light / (max(guides.albedo, LEAST_DIVISOR) * count);
+    }
+    write_layer(POSITION_PLANE, pixel, guides.position);
+    write_layer(NORMAL_PLANE, pixel, guides.normal);
+    write_layer(ALBEDO_PLANE, pixel, guides.albedo);
+    image_pixels[layer_word(SURFACE_PLANE, pixel)] = guides.surface;
+    write_layer(LIGHT_PLANE, pixel, light);
+    if (has_gloss)
+        write_layer(GLOSS_PLANE, pixel, is_real ? (sums.light - sums.covered) / count : vec3(0.0));
+}
+
 void write_pixel(uvec2 position) {
     position.y += band.first_row;
     if (position.x >= frame.width || position.y >= frame.height)
         return;
     uint pixel = position.y * frame.width + position.x;
     Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0));
-    for (uint i = 0u; i < frame.sample_count; ++i) {
-        vec3 direction;
-        if (direction_of(pixel, frame.samples[i].xy, direction))
-            trace_sample(direction, random_of_pixel(position, frame.first_random + i), sums);
+    guides = Guides(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
+    seen = vec3(0.0);
+    vec3 centre, near;
+    bool has_centre = !is_denoised() || direction_of(pixel, vec2(0.0), centre);
+    uint count_of_samples = frame.sample_count;
+    for (uint i = 0u; i < count_of_samples && has_centre; ++i) { // a single call of trace_sample(), which is large
+        uint further = i < frame.sample_count ? 0u : i + 1u - frame.sample_count;
+        vec2 at = further > 0u ? further_offset(further) : frame.samples[i].xy;
+        if (is_denoised() && frame.seen_moves != 0u && further == 0u)
+            at = vec2(0.0);
+        bool has_ray = direction_of(pixel, at, near);
+        if (further > 0u && !has_ray)
+            near = centre;
+        else if (!has_ray)
+            continue;
+        // The random numbers of further samples are far from those of all frames.
+        Random random = random_of_pixel(position, frame.first_random + (further > 0u ? further << 28 : i));
+        trace_sample(is_denoised() ? centre : near, near, random, sums);
+        if (is_denoised() && i + 1u == frame.sample_count && kind_of(guides.surface) == SPECULAR_SURFACE)
+            count_of_samples += MORE_SAMPLES;
+    }
+    if (is_denoised()) {
+        write_layers(pixel, sums);
+        return;
     }
     if (frame.accumulates != 0u) {
         if (frame.first_sample > 0u) {

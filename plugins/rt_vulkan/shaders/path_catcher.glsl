@@ -3,6 +3,14 @@
 // Real surfaces: how virtual objects change the light of catchers, and what the video shows of them. Equivalent to
 // rt_embree's kernel/path_catcher.inl.
 
+// Bits of frame.shown_parts.
+const uint SHADOW_PART = 1u, BOUNCE_PART = 2u, CAUSTICS_PART = 4u;
+
+// Returns whether an image shows a part of the change of a catcher's light.
+bool shows(uint part) {
+    return !may_denoise || (frame.shown_parts & part) != 0u;
+}
+
 // Returns whether a ray can meet a virtual object. `end`: in lengths of `to`.
 bool can_meet_virtual(vec3 origin, vec3 to, float end) {
     float scale = 1.0 / max(dot(to, to), 1e-30);

@@ -19,6 +19,8 @@
 #include "path_catcher.glsl"
 #include "photons.glsl"
 #include "pixel.glsl"
+#include "layers.glsl"
+#include "guides.glsl"
 #include "path.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

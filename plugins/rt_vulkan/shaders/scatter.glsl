@@ -18,13 +18,15 @@ struct Path {
     float inverse_density;
     uint depth; // number of bounces so far
     uint plane; // to which the radiance is added
+    bool is_random; // whether random choices other than that of a direction have scattered the path
 };
 
 Path stack[stack_capacity];
 int stack_size;
 
 void push(Path from, vec3 origin, vec3 direction, vec3 throughput, float inverse_density) {
-    stack[stack_size++] = Path(origin, direction, throughput, inverse_density, from.depth + 1u, from.plane);
+    stack[stack_size++] =
+        Path(origin, direction, throughput, inverse_density, from.depth + 1u, from.plane, from.is_random);
 }
 
 // Reflected rays below this throughput are invisible.

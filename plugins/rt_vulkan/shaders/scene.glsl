@@ -30,6 +30,7 @@ layout(constant_id = 6) const bool has_area_lights = true;
 layout(constant_id = 7) const bool may_have_video = true; // whether any image has a video
 layout(constant_id = 8) const bool has_gloss = true; // path integrator: whether a catcher may mirror virtual objects
 layout(constant_id = 9) const bool has_photons = true;    // whether any image has caustics of lamps
+layout(constant_id = 10) const bool may_denoise = true;   // path integrator: whether any image is denoised
 
 struct Object {
     mat4x3 object_from_world;
@@ -129,6 +130,10 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint environment_rows, environment_columns; // indices into `tables`
     float shadow_alpha_opaque, shadow_alpha_translucent;
     uint has_slopes;
+    // With denoising:
+    uint denoises;
+    uint seen_moves;   // whether what curved mirrors and glass show may move over them
+    float pixel_angle; // width of a pixel in the middle of the image, in units of its distance
     vec4 samples[256]; // x, y: offset from the pixel's centre in px, −½ to ½
 
     // The path integrator.
@@ -157,7 +162,8 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint first_target, first_target_chance; // indices into `tables`: cumulative and other chances (PhotonTargets)
     float scene_extent;                     // mm: length of the diagonal of the scene's bounds
     uint photon_count, first_photon;        // of this frame; offset into the random sequence
-    uint unused, unused_2;
+    uint shown_parts;                       // of the change of a catcher's light: bits of path_catcher.glsl
+    uint unused;
 }
 frame;
 
@@ -217,8 +223,8 @@ struct Sums {
 layout(std430, set = 0, binding = 12) buffer History {
     Sums history[]; // sums of all earlier samples
 };
-layout(std430, set = 0, binding = 13) writeonly buffer Image {
-    uint image_pixels[];
+layout(std430, set = 0, binding = 13) buffer Image {
+    uint image_pixels[]; // with denoising: the planes of layers.glsl
 };
 layout(std430, set = 0, binding = 14) coherent buffer Drawn {
     int drawn_x0, drawn_y0, drawn_x1, drawn_y1; // bounding rectangle of the pixels with non-zero alpha
