@@ -120,7 +120,8 @@ void frames_before(Context &context) {
 }
 
 struct StatefulRequests {
-    const char *name;
+    std::string name;
+    arhost_integrator integrator = ARHOST_INTEGRATOR_WHITTED;
     bool has_video = false, is_scaled = false;
 };
 
@@ -141,10 +142,9 @@ void expect_same(const LinearPicture &actual, const LinearPicture &expected, con
 // no state. Image: Picture or LinearPicture.
 template <class Image> bool continues_from_state(Context &context, const StatefulRequests &requests) {
     const arhost_camera here = still_life_camera(), there = camera({120, -90, 160}, {0, 0, 10}, {0, 0, 1});
-    const auto scene = [] {
+    const auto scene = [&] {
         scene::ArenaBuilder builder = still_life();
-        if (std::is_same_v<Image, LinearPicture>)
-            builder.settings.integrator = ARHOST_INTEGRATOR_PATH;
+        builder.settings.integrator = requests.integrator;
         return builder;
     };
     std::list<Video> videos;
@@ -188,20 +188,26 @@ template <class Image> bool continues_from_state(Context &context, const Statefu
 }
 
 void state(Context &context) {
-    // A ray tracer may have a state for some scenes only, such as for those of the path integrator.
-    bool has_state = continues_from_state<Picture>(context, {"straight images"});
-    const bool writes_linear = has_capability(context, ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES);
-    const auto check = [&](const StatefulRequests &requests) {
-        const bool has = writes_linear ? continues_from_state<LinearPicture>(context, requests)
-                                       : continues_from_state<Picture>(context, requests);
-        has_state = has_state || has;
+    const bool writes_linear = has_capability(context, ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES),
+               is_scalable = has_capability(context, ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES),
+               knows_video = has_capability(context, ARHOST_RAYTRACER_CAPABILITY_VIDEO);
+    bool has_state = false;
+    const auto check = [&](const std::string &form, arhost_integrator integrator, auto continues) {
+        const auto check_one = [&](const StatefulRequests &requests) {
+            const bool has = continues(context, requests); // maybe for scenes of one integrator only
+            has_state = has_state || has;
+        };
+        check_one({form + " images", integrator});
+        if (is_scalable)
+            check_one({form + " images of two sizes", integrator, false, true});
+        if (knows_video)
+            check_one({form + " images with video", integrator, true, false});
     };
-    if (writes_linear)
-        check({"linear images"});
-    if (has_capability(context, ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES))
-        check({.name = "images of two sizes", .is_scaled = true});
-    if (has_capability(context, ARHOST_RAYTRACER_CAPABILITY_VIDEO))
-        check({.name = "images with video", .has_video = true});
+    check("straight", ARHOST_INTEGRATOR_WHITTED, continues_from_state<Picture>);
+    if (writes_linear) {
+        check("path-traced straight", ARHOST_INTEGRATOR_PATH, continues_from_state<Picture>);
+        check("linear", ARHOST_INTEGRATOR_PATH, continues_from_state<LinearPicture>);
+    }
     if (!has_state)
         throw Skip("it has no state");
 }

@@ -29,7 +29,7 @@ float in_texels(float t, std::int32_t size, arhost_wrap wrap) {
     return reduced * static_cast<float>(size) - 0.5f;
 }
 
-// Samples the texture's alpha with bilinear filtering, like sample_texture() in kernel/texture.inl.
+// Samples the texture's alpha with bilinear filtering, like sample_texture() in raytracer_common/packets/texture.inl.
 float sampled_alpha(const Texture &texture, float u, float v) {
     const float x = in_texels(u, texture.width, texture.wrap_u), y = in_texels(v, texture.height, texture.wrap_v);
     const float left = std::floor(x), top = std::floor(y);

@@ -101,8 +101,6 @@ public:
         if (settings_.view != View::picture && renderer_->state_size() == 0)
             throw arhost::Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                                   "option 'show': images of this scene are not denoised; only 'picture' is possible");
-        if (settings_.denoise && setup.scene->integrator == ARHOST_INTEGRATOR_PATH && renderer_->state_size() == 0)
-            host_.info("images are not denoised: the scene has too many objects, or the images too many pixels");
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {

@@ -190,10 +190,10 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     frame_.max_radiance = settings.max_radiance;
     frame_.is_linear = is_linear(setup);
     frame_.blends_codes = setup.compositing != ARHOST_COMPOSITING_LINEAR;
-    frame_.shown_parts = shown_parts(settings.view);
     set_lens();
-    if (settings.denoise && is_path_ && setup.scene->objects.count <= Denoising::most_objects &&
-        layers_size() <= physical.properties.limits.maxStorageBufferRange)
+    if (settings.denoise && is_path_ && setup.scene->objects.count > Denoising::most_objects)
+        host_.info("images are not denoised: the scene has too many objects");
+    else if (settings.denoise && is_path_)
         denoiser_.emplace(intrinsics_, setup.scene->objects.count, scene_.has_catchers(), scene_.has_gloss(),
                           scene_.has_specular(), settings.view, settings.denoiser_threads);
     make_buffers(shaders.path);
@@ -303,6 +303,22 @@ std::size_t Renderer::layers_size() const {
            intrinsics_.height;
 }
 
+// Makes the buffer of the image or, with denoising, of the planes. Does without denoising if the device has no memory
+// for them.
+void Renderer::make_image_buffer(std::size_t image_size) {
+    if (denoiser_)
+        try {
+            layers_ = Buffer(device_, layers_size(), VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
+            buffers_[image_binding] = make_buffer(image_binding, {}, std::max(image_size, layers_size()));
+            return;
+        } catch (const Failure &failure) {
+            denoiser_.reset();
+            layers_ = {};
+            host_.warn(std::string("images are not denoised: ") + failure.what());
+        }
+    buffers_[image_binding] = make_buffer(image_binding, {}, image_size);
+}
+
 void Renderer::make_buffers(Path path) {
     const std::size_t pixels = std::size_t{intrinsics_.width} * intrinsics_.height;
     std::size_t moving_size = 0;
@@ -316,11 +332,7 @@ void Renderer::make_buffers(Path path) {
     make_rays(settings_.samples > 1 || settings_.accumulate || is_path_);
     make_photon_buffers(settings_.samples);
     buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? sizeof(Sums) * pixels : 0);
-    const std::size_t image_size = pixel_size_ * pixels;
-    buffers_[image_binding] =
-        make_buffer(image_binding, {}, denoiser_ ? std::max(image_size, layers_size()) : image_size);
-    if (denoiser_)
-        layers_ = Buffer(device_, layers_size(), VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
+    make_image_buffer(pixel_size_ * pixels);
     buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
     buffers_[frame_binding] =
         Buffer(device_, sizeof(Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, Buffer::Place::host_written);
@@ -659,6 +671,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 
     const bool denoises = denoiser_ && state.after;
     frame_.denoises = denoises;
+    frame_.shown_parts = shown_parts(denoises ? settings_.view : arhost::raytracer_common::View::picture);
     if (denoises)
         begin_denoising(state, image, motion, sequence);
     arhost::raytracer_common::SlowImage slow_image(host_);

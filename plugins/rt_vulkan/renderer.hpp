@@ -84,6 +84,7 @@ private:
     bool make_photon_buffers(std::uint32_t samples);
     std::size_t layers_size() const;
     void update_descriptor_set();
+    void make_image_buffer(std::size_t image_size);
     void make_buffers(Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t min_size,
                        VkBufferUsageFlags more_usage = 0);

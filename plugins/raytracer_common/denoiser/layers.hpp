@@ -101,9 +101,9 @@ struct Denoising {
     // The light of virtual objects in each pixel, and that of catchers; if no lamp casts sharp shadows, in cells of
     // 2×2 pixels. The guides of `objects` are also those of catchers, except of the flat one. `gloss` exists only if
     // the scene has glossy catchers; it shares the guides of `catchers`, whose albedo is their diffuse light without
-    // virtual objects (matt_row).
+    // virtual objects.
     Layer objects, catchers, gloss;
-    unsigned *taps; // of pixels at edges: see tap_count in denoise.inl
+    unsigned *taps; // of pixels at edges: see tap_count in layers.inl
     bool has_gloss; // whether `gloss` exists
     Camera camera, camera_before;
     Video video; // whose pixel grid covers that of the image
@@ -116,8 +116,9 @@ struct Denoising {
     // Catchers are sampled at one of each 2×2 pixels: 2 · (row mod 2) + column mod 2; −1: at all pixels. Likewise the
     // virtual objects; but mirrors and glass, whose history is short, always at all pixels.
     std::int32_t catcher_phase, object_phase;
-    std::uint32_t number;               // of the frame, without gaps
-    std::uint32_t first_random_in_turn; // as Frame::first_random, of pixels that are sampled in every fourth frame
+    std::uint32_t number; // of the frame, without gaps
+    std::uint32_t
+        first_random_in_turn; // offset into the random sequences of pixels that are sampled in every fourth frame
     // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
     // axes. NULL if no placement has changed.
     const float *before_from_now;

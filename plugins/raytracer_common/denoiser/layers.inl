@@ -27,6 +27,10 @@ ARHOST_INLINE Int surfaces_at(const Layer &layer, std::ptrdiff_t at) {
     return bits_of(load(layer.guides[surface_guide] + at));
 }
 
+// As the scalar surface_number().
+ARHOST_INLINE Int surface_number(Int object, Int kind) {
+    return ((object + Int(1)) << Int(2)) | kind;
+}
 ARHOST_INLINE Int object_of_surface(Int surface) {
     return ((surface & Int(mirrored_unit - 1)) >> Int(2)) - Int(1);
 }

@@ -211,7 +211,7 @@ ARHOST_INLINE void accumulate(const Denoising &denoising, const Layer &layer, st
             most = select(is_glossy, min(most, most_of_glossy), most);
         }
         if (denoising.camera_moved) {
-            // Curved mirrors and glass show a surface elsewhere than store_seen() assumes.
+            // Curved mirrors and glass show a surface elsewhere than at the position of the guides.
             most = select(is_kind(surface, specular_surface), min(most, Float(4.0f)), most);
             most = select(shows_surroundings, Float(1.0f), most);
         }
@@ -452,7 +452,7 @@ private:
     int flat_surface_, x_, row_;
 };
 
-// Returns what Frame::view shows of the pixels of a row.
+// Returns what Denoising::view shows of the pixels of a row.
 ARHOST_INLINE Vec3 viewed(const Denoising &denoising, const InterpolatedCatchers &catchers, int x, int row,
                           Int surface) {
     const Layer &objects = denoising.objects, &cells = denoising.catchers;
@@ -517,7 +517,7 @@ ARHOST_INLINE Rectangle resolve(const Denoising &denoising, std::int32_t row) {
         LinearBlock linear{black(), black()};
         const InterpolatedCatchers catchers(denoising, denoising.catchers, x, row),
             glosses(denoising, denoising.has_gloss ? denoising.gloss : denoising.catchers, x, row);
-        // Of glossy catchers; `matt`: matt_row.
+        // Of glossy catchers; `matt`: their diffuse light without virtual objects.
         Vec3 gloss = black(), matt = black();
         Float real_share(0.0f);
         // `light`, `albedo`: of virtual objects.

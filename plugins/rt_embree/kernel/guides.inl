@@ -19,7 +19,7 @@ ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool activ
             kind = specular_surface;
         kinds = select(here, Int(kind), kinds);
     });
-    return (((object_number(scene, hit) + Int(1)) << Int(2)) & Int(mirrored_unit - 1)) | kinds;
+    return surface_number(object_number(scene, hit), kinds) & Int(mirrored_unit - 1);
 }
 struct Guides {
     Vec3 position, normal, albedo;

@@ -330,11 +330,12 @@ struct KnownChange {
 ARHOST_INLINE KnownChange known_change(const Frame &frame, const RTCHit16 &hit, const Surface &s, Bool active) {
     constexpr float least_frames = 8; // means of fewer frames have more noise than new samples in each frame
     KnownChange past{bool_of(false), black()};
-    if (!frame.denoising || !frame.denoising->catchers.before[0] || frame.view != View::picture)
+    const bool is_whole = shows(frame, View::shadow) && shows(frame, View::bounce);
+    if (!frame.denoising || !frame.denoising->catchers.before[0] || !is_whole)
         return past;
     const Denoising &denoising = *frame.denoising;
     const Layer &layer = denoising.catchers;
-    const Int surface = ((object_number(frame.scene, hit) + Int(1)) << Int(2)) | Int(real_surface);
+    const Int surface = surface_number(object_number(frame.scene, hit), Int(real_surface));
     const PastPoints before = points_before(denoising, s.position, s.normal, surface, active);
     const Projected at = projected(denoising, denoising.camera_before, before.position);
     const float side = static_cast<float>(layer.cell_px);
@@ -365,12 +366,17 @@ ARHOST_INLINE FilmedLight add_filmed(Work &work, const RTCHit16 &hit, const Surf
     active = filmed.inside;
     if (!any(active))
         return {filmed.light, active};
-    const KnownChange past = known_change(frame, hit, s, active);
-    add_radiance(work, paths, filmed.light * (white() + past.change), active & past.known);
+    const Vec3 relative = relative_change(frame, s, irradiance_without_objects(frame, s));
+    const Vec3 reflectance = filmed.light * relative;
+    // If the described light is weaker than that of the video, the surface must not reflect more than it receives.
+    // The known change does not tell to how much of it this applies.
+    const Vec3 albedo{min(reflectance.x, Float(1.0f)), min(reflectance.y, Float(1.0f)),
+                      min(reflectance.z, Float(1.0f))};
+    const KnownChange past = known_change(frame, hit, s, active & (Float(1.0f) >= largest(reflectance)));
+    add_radiance(work, paths, filmed.light * (white() + past.change), past.known);
     const Bool unknown = active & ~past.known;
     if (!any(unknown))
         return {filmed.light, active};
-    const Vec3 relative = relative_change(frame, s, irradiance_without_objects(frame, s));
     const Float form_factors = form_factors_of(frame.path, s);
     // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
     // directly.
@@ -380,10 +386,6 @@ ARHOST_INLINE FilmedLight add_filmed(Work &work, const RTCHit16 &hit, const Surf
         photon_irradiance(work, paths, s, unknown);
     add_radiance(work, paths, filmed.light * (white() + change * relative), unknown);
     const float sample_ratio = static_cast<float>(count) / static_cast<float>(source_samples(frame, paths.depth));
-    // If the described light is weaker than that of the video, the surface must not reflect more than it receives.
-    const Vec3 reflectance = filmed.light * relative;
-    const Vec3 albedo{min(reflectance.x, Float(1.0f)), min(reflectance.y, Float(1.0f)),
-                      min(reflectance.z, Float(1.0f))};
     enqueue_bounce(work, paths, s, form_factors, paths.throughput * albedo, sample_ratio, unknown);
     return {filmed.light, active};
 }

@@ -11,10 +11,10 @@ Guides guides;
 
 const float LEAST_DIVISOR = 1.0 / 64.0; // of the light of virtual objects
 
-// The denoiser divides the light of a surface that is neither a mirror nor glass by its albedo, so that textures stay
-// sharp.
-vec3 divisor_of(Surface s) {
-    if (largest(s.emission) > 0.0)
+// The denoiser divides the light of a surface by its albedo, so that textures stay sharp. `is_lit`: neither a mirror nor
+// glass.
+vec3 divisor_of(Surface s, bool is_lit) {
+    if (!is_lit || largest(s.emission) > 0.0)
         return vec3(1.0);
     return max(s.is_rough ? s.diffuse + s.specular : s.diffuse, LEAST_DIVISOR);
 }

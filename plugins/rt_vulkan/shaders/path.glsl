@@ -231,12 +231,12 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
         if (path.depth == 0u && kind_of(guides.surface) != SPECULAR_SURFACE) {
             guides.position = s.position;
             guides.normal = s.normal;
-            guides.albedo = divisor_of(s);
+            guides.albedo = divisor_of(s, is_lit);
         }
         bool is_emissive = receiver == LIT_SURFACE && largest(s.emission) > 0.0;
         add_seen(path, sum + (receiver == FILMED_SURFACE ? video
                               : is_emissive              ? s.emission
-                              : is_lit                   ? divisor_of(s)
+                              : is_lit                   ? divisor_of(s, is_lit)
                                                          : vec3(0.0)));
     }
     if (receiver != LIT_SURFACE || is_covered)
@@ -437,22 +437,22 @@ void write_pixel(uvec2 position) {
     Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0));
     guides = Guides(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
     seen = vec3(0.0);
-    vec3 centre, near;
-    bool has_centre = !is_denoised() || direction_of(pixel, vec2(0.0), centre);
     uint count_of_samples = frame.sample_count;
-    for (uint i = 0u; i < count_of_samples && has_centre; ++i) { // a single call of trace_sample(), which is large
+    for (uint i = 0u; i < count_of_samples; ++i) { // a single call of trace_sample(), which is large
         uint further = i < frame.sample_count ? 0u : i + 1u - frame.sample_count;
         vec2 at = further > 0u ? further_offset(further) : frame.samples[i].xy;
         if (is_denoised() && frame.seen_moves != 0u && further == 0u)
             at = vec2(0.0);
-        bool has_ray = direction_of(pixel, at, near);
-        if (further > 0u && !has_ray)
-            near = centre;
-        else if (!has_ray)
-            continue;
+        vec3 centre, near;
+        if (!direction_of(pixel, at, near))
+            break;
+        if (is_denoised())
+            direction_of(pixel, vec2(0.0), centre);
+        else
+            centre = near;
         // The random numbers of further samples are far from those of all frames.
         Random random = random_of_pixel(position, frame.first_random + (further > 0u ? further << 28 : i));
-        trace_sample(is_denoised() ? centre : near, near, random, sums);
+        trace_sample(centre, near, random, sums);
         if (is_denoised() && i + 1u == frame.sample_count && kind_of(guides.surface) == SPECULAR_SURFACE)
             count_of_samples += MORE_SAMPLES;
     }

@@ -44,12 +44,12 @@ uint tap_of(ivec2 pixel, vec3 direction) {
     for (;;) {
         bool of_catchers = ray.mask == CATCHER_MASK;
         hit = trace(ray, false, of_catchers);
-        if (of_catchers || (hit.object != NONE && objects[hit.object].role == VIRTUAL))
+        if (of_catchers || !has_catchers || (hit.object != NONE && objects[hit.object].role == VIRTUAL))
             break;
         ray.t_max = hit.object != NONE ? hit.t : INFINITY;
         ray.mask = CATCHER_MASK;
     }
-    if (hit.object == NONE)
+    if (hit.object == NONE || objects[hit.object].role == OCCLUDER)
         return NO_TAP;
     uint surface = surface_of(hit.object), chosen = OWN_TAP;
     vec3 position = frame.eye + direction * hit.t;

@@ -115,6 +115,34 @@ TEST_P(DenoisingOfWhatIsSeen, LosesNoLight) {
     EXPECT_NEAR(light / expected, 1, 0.03); // fireflies are bounded
 }
 
+// The light that a shelf and the table below it send to each other stays in proportion to that of the surroundings,
+// also if this is much weaker than the video.
+TEST(DenoisingOfFilmedSurfaces, LightDoesNotGrowFromFrameToFrame) {
+    const auto make = [] {
+        SceneBuilder scene(path_traced(0.04f));
+        scene.add_mesh("table", square(2000), diffuse(0.8f, 0.8f, 0.8f), ARHOST_ROLE_CATCHER);
+        scene.add_mesh("shelf", quad({-60, -40, 14}, {60, -40, 14}, {60, 60, 14}, {-60, 60, 14}),
+                       diffuse(0.9f, 0.9f, 0.9f));
+        return scene;
+    };
+    const arhost_camera view = camera({0, -220, 30}, {0, 0, 5}, {0, 0, 1});
+    const Video video(view.intrinsics, 230);
+    const LinearPicture truth = picture_of(make(), converged, view, {}, &video);
+    LinearTracer tracer(make(), denoised, "rt_embree");
+    ASSERT_EQ(tracer.start(view.intrinsics, &video), ARHOST_STATUS_OK) << tracer.log();
+    constexpr std::uint64_t frames = 60;
+    LinearPicture picture = tracer.render(view, 0, &video);
+    for (std::uint64_t i = 1; i < frames; ++i)
+        picture = tracer.render(view, i, &video);
+    double light = 0, expected = 0; // of the table
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x) {
+            light += double{picture.value(x, y, 5)};
+            expected += double{truth.value(x, y, 5)};
+        }
+    EXPECT_NEAR(light / expected, 1, 0.1); // fireflies are bounded
+}
+
 // The table mirrors the objects, and not what they cover.
 TEST(DenoisingOfGloss, ConvergesWhileTheCameraRests) {
     const auto make = [] { return still_life(metallic_roughness({0.2f, 0.2f, 0.2f}, 0, 0.15f)); };

@@ -11,11 +11,15 @@
 namespace arhost::test {
 namespace {
 
-const arhost_intrinsics small = pinhole(96, 72, 96);
+const arhost_intrinsics small = pinhole(90, 70, 90);
 const Options denoised{{"quality", "realtime"}}, converged{{"samples", "256"}};
 
 SceneBuilder on_matt_table() {
-    return with_mirror_and_glass();
+    SceneBuilder scene = with_mirror_and_glass();
+    arhost_material frosted = glass_of();
+    frosted.roughness = 0.3f;
+    scene.add_ball("frosted", {50, -10, 12, 12}, frosted);
+    return scene;
 }
 SceneBuilder on_glossy_table() {
     return with_mirror_and_glass(metallic_roughness({0.2f, 0.2f, 0.2f}, 0, 0.15f));
