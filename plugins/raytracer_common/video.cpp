@@ -5,6 +5,7 @@
 #include <arhost/shading/scalar.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace arhost::raytracer_common {
@@ -18,29 +19,41 @@ LumaWeights weights_of(arhost_yuv_matrix matrix) {
     return matrix == ARHOST_YUV_MATRIX_BT709 ? LumaWeights{0.2126f, 0.0722f} : LumaWeights{0.299f, 0.114f};
 }
 
-std::uint8_t code_of(float value) {
-    return static_cast<std::uint8_t>(std::clamp(value + 0.5f, 0.0f, 255.0f));
-}
-
-// Writes the colours of the frame's pixels with these Y', Cb and Cr codes.
+// Converts Y', Cb and Cr codes, in fixed point.
 class FromYuv {
 public:
-    explicit FromYuv(const arhost_frame_format &format)
-        : weights_(weights_of(format.yuv_matrix)), is_limited_(format.yuv_range == ARHOST_YUV_RANGE_LIMITED) {}
+    explicit FromYuv(const arhost_frame_format &format) {
+        const auto [red, blue] = weights_of(format.yuv_matrix);
+        const bool is_limited = format.yuv_range == ARHOST_YUV_RANGE_LIMITED;
+        const float chroma = is_limited ? 255.0f / 224 : 1;
+        black_ = is_limited ? 16 : 0;
+        luma_ = fixed(is_limited ? 255.0f / 219 : 1);
+        red_of_cr_ = fixed(2 * (1 - red) * chroma);
+        blue_of_cb_ = fixed(2 * (1 - blue) * chroma);
+        green_of_cr_ = fixed(-2 * (1 - red) * red / (1 - red - blue) * chroma);
+        green_of_cb_ = fixed(-2 * (1 - blue) * blue / (1 - red - blue) * chroma);
+    }
 
-    void write(std::uint8_t luma, std::uint8_t cb, std::uint8_t cr, std::uint8_t *to) const {
-        const float y = is_limited_ ? (luma - 16.0f) * (255.0f / 219) : luma;
-        const float scale = is_limited_ ? 255.0f / 224 : 1, b = (cb - 128.0f) * scale, r = (cr - 128.0f) * scale;
-        const float red = y + 2 * (1 - weights_.red) * r, blue = y + 2 * (1 - weights_.blue) * b;
-        const float green = (y - weights_.red * red - weights_.blue * blue) / (1 - weights_.red - weights_.blue);
-        to[0] = code_of(red);
-        to[1] = code_of(green);
-        to[2] = code_of(blue);
+    // Writes two pixels, which have the same chroma.
+    void write(std::uint8_t luma, std::uint8_t next_luma, std::uint8_t cb, std::uint8_t cr, std::uint8_t *to) const {
+        const int u = cb - 128, v = cr - 128;
+        const int red = v * red_of_cr_, green = u * green_of_cb_ + v * green_of_cr_, blue = u * blue_of_cb_;
+        const auto write_one = [&](std::uint8_t code, std::uint8_t *pixel) {
+            const int y = (code - black_) * luma_ + one / 2; // rounds
+            pixel[0] = code_of(y + red);
+            pixel[1] = code_of(y + green);
+            pixel[2] = code_of(y + blue);
+        };
+        write_one(luma, to);
+        write_one(next_luma, to + 4);
     }
 
 private:
-    LumaWeights weights_;
-    bool is_limited_;
+    static constexpr int shift = 16, one = 1 << shift;
+    static int fixed(float value) { return static_cast<int>(std::lround(value * one)); }
+    static std::uint8_t code_of(int value) { return static_cast<std::uint8_t>(std::clamp(value >> shift, 0, 255)); }
+
+    int black_, luma_, red_of_cr_, blue_of_cb_, green_of_cr_, green_of_cb_;
 };
 
 } // namespace
@@ -51,36 +64,46 @@ void VideoImage::set(const arhost_frame &frame) {
     width_ = format.width;
     height_ = format.height;
     texels_.resize(std::size_t{4} * format.width * format.height, 255);
-    std::uint8_t *to = texels_.data();
     for (std::size_t y = 0; y < format.height; ++y) {
+        std::uint8_t *to = texels_.data() + std::size_t{4} * format.width * y;
         const auto row = [&](std::size_t plane, std::size_t at) {
             return frame.plane[plane] + at * format.stride[plane];
         };
-        for (std::size_t x = 0; x < format.width; ++x, to += 4)
-            switch (format.pixel_format) {
-            case ARHOST_PIXEL_FORMAT_GREY8:
-                std::fill_n(to, 3, row(0, y)[x]);
-                break;
-            case ARHOST_PIXEL_FORMAT_RGB8:
-                std::copy_n(row(0, y) + 3 * x, 3, to);
-                break;
-            case ARHOST_PIXEL_FORMAT_BGR8:
-                std::reverse_copy(row(0, y) + 3 * x, row(0, y) + 3 * x + 3, to);
-                break;
-            case ARHOST_PIXEL_FORMAT_YUYV: {
-                const std::uint8_t *pair = row(0, y) + x / 2 * 4;
-                from_yuv.write(pair[x % 2 * 2], pair[1], pair[3], to);
-                break;
+        const std::uint8_t *from = row(0, y);
+        const auto copy = [&](std::size_t step, std::size_t red, std::size_t green, std::size_t blue) {
+            for (std::size_t x = 0; x < format.width; ++x) {
+                to[4 * x] = from[step * x + red];
+                to[4 * x + 1] = from[step * x + green];
+                to[4 * x + 2] = from[step * x + blue];
             }
-            case ARHOST_PIXEL_FORMAT_NV12: {
-                const std::uint8_t *chroma = row(1, y / 2) + x / 2 * 2;
-                from_yuv.write(row(0, y)[x], chroma[0], chroma[1], to);
-                break;
-            }
-            case ARHOST_PIXEL_FORMAT_I420:
-                from_yuv.write(row(0, y)[x], row(1, y / 2)[x / 2], row(2, y / 2)[x / 2], to);
-                break;
-            }
+        };
+        switch (format.pixel_format) {
+        case ARHOST_PIXEL_FORMAT_GREY8:
+            copy(1, 0, 0, 0);
+            break;
+        case ARHOST_PIXEL_FORMAT_RGB8:
+            copy(3, 0, 1, 2);
+            break;
+        case ARHOST_PIXEL_FORMAT_BGR8:
+            copy(3, 2, 1, 0);
+            break;
+        case ARHOST_PIXEL_FORMAT_YUYV:
+            for (std::size_t x = 0; x < format.width; x += 2)
+                from_yuv.write(from[2 * x], from[2 * x + 2], from[2 * x + 1], from[2 * x + 3], to + 4 * x);
+            break;
+        case ARHOST_PIXEL_FORMAT_NV12: {
+            const std::uint8_t *chroma = row(1, y / 2);
+            for (std::size_t x = 0; x < format.width; x += 2)
+                from_yuv.write(from[x], from[x + 1], chroma[x], chroma[x + 1], to + 4 * x);
+            break;
+        }
+        case ARHOST_PIXEL_FORMAT_I420: {
+            const std::uint8_t *cb = row(1, y / 2), *cr = row(2, y / 2);
+            for (std::size_t x = 0; x < format.width; x += 2)
+                from_yuv.write(from[x], from[x + 1], cb[x / 2], cr[x / 2], to + 4 * x);
+            break;
+        }
+        }
     }
 }
 
