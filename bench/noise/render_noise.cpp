@@ -2,7 +2,7 @@
 //
 // Measures the noise of rt_embree's path integrator for `tools/bench noise`:
 //   render-noise SCENE [KEY=VALUE...]
-// Renders frames like a run does, with the state of each frame passed to the next, blends them with a grey video, and
+// Renders frames like a run does, with the state of each frame passed to the next, over a grey video, and
 // compares them with converged pictures. Prints, by kind of surface, the RMS difference in codes, and the temporal
 // standard deviation if the camera stands still. Keys: width, height, samples, light_samples, photons, denoise,
 // shading_px, threads, frames, orbit (degrees per frame), reference (frames of 64 samples), out (folder for the

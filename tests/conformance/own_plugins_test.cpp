@@ -72,8 +72,7 @@ INSTANTIATE_TEST_SUITE_P(
     name_of);
 INSTANTIATE_TEST_SUITE_P(
     Exhaustive, OwnPlugins,
-    testing::Values(OwnPlugin{"VulkanReference", "rt_vulkan", {"quality=reference"}},
-                    OwnPlugin{"AprilTag", "tracker_apriltag", {}}, OwnPlugin{"Pictures", "tracker_image", {}},
+    testing::Values(OwnPlugin{"AprilTag", "tracker_apriltag", {}}, OwnPlugin{"Pictures", "tracker_image", {}},
                     OwnPlugin{"FilePicture", "source_file", {"path=in/00.png"}},
                     OwnPlugin{"FileLoop", "source_file", {"path=in/a.mp4", "loop=true", "frames=30"}},
                     OwnPlugin{"PythonSource", "source_python", {}}, OwnPlugin{"PythonTracker", "tracker_python", {}},
