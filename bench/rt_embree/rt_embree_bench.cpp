@@ -305,7 +305,7 @@ int main(int argc, char **argv) {
     if (argc > 1)
         settings.threads = static_cast<unsigned>(std::atoi(argv[1]));
     if (argc > 2)
-        settings.instruction_set = argv[2];
+        settings.instruction_set = arhost::raytracer_common::choose_instruction_set(argv[2]);
 
     const auto [mesh, name] = arhost::bench::bunny(arhost::test::shared_data_directory());
     arhost_material diffuse = make_material(ARHOST_MATERIAL_DIFFUSE), mirror = make_material(ARHOST_MATERIAL_MIRROR);

@@ -146,8 +146,7 @@ ColourTables::ColourTables() : srgb8(shading::make_srgb8_table()) {
         linear_of_srgb8[code] = static_cast<float>(shading::srgb_decode(static_cast<double>(code) / 255));
 }
 
-Video video_through(const arhost_intrinsics &intrinsics, const ColourTables &tables, std::uint32_t width,
-                    std::uint32_t height) {
+Video video_through(const arhost_intrinsics &intrinsics, const ColourTables &tables) {
     Video video{};
     video.image = {nullptr,
                    static_cast<std::int32_t>(intrinsics.width),
@@ -163,8 +162,8 @@ Video video_through(const arhost_intrinsics &intrinsics, const ColourTables &tab
     video.distortion = intrinsics.distortion;
     std::copy_n(intrinsics.coefficients, intrinsics.coefficient_count, video.coefficients);
     video.max_radius_squared = max_radius_squared(intrinsics);
-    video.pixel_width = 1 / static_cast<float>(width);
-    video.pixel_height = 1 / static_cast<float>(height);
+    video.pixel_width = 1 / static_cast<float>(intrinsics.width);
+    video.pixel_height = 1 / static_cast<float>(intrinsics.height);
     return video;
 }
 

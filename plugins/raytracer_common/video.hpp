@@ -40,10 +40,9 @@ struct ColourTables {
     ColourTables();
 };
 
-// Returns a video through a lens, without texels. `tables` must outlive the result. `width`, `height`: of the
-// overlay, px.
-Video video_through(const arhost_intrinsics &intrinsics, const ColourTables &tables, std::uint32_t width,
-                    std::uint32_t height);
+// Returns a video through a lens, without texels, under an overlay of the same size. `tables` must outlive the
+// result.
+Video video_through(const arhost_intrinsics &intrinsics, const ColourTables &tables);
 
 // Returns the largest squared length of (x/z, y/z) of the directions in the picture: lens models are not valid far
 // outside of it. Infinite for a camera without distortion.

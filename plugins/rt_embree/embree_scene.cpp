@@ -228,7 +228,6 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         to.rows = elements<float>(arena, from.rows).data();
         to.columns = elements<float>(arena, from.columns).data();
     }
-    view_.srgb8 = &colour_tables_->srgb8;
 }
 
 void EmbreeScene::set_environment_scale(const std::array<float, 3> &scale) {

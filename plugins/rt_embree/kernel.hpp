@@ -107,7 +107,6 @@ struct Scene {
     bool has_area_lights;
     bool has_background; // a background that is not black, and no environment
     int sum_row_count() const { return has_gloss ? sum_rows : has_catchers ? hidden_row + 3 : caught_row; }
-    const arhost::shading::Srgb8Table *srgb8;
     const float *linear_of_srgb8; // linear value of each of the 256 sRGB codes
 };
 

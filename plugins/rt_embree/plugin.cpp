@@ -5,7 +5,6 @@
 
 #include <arhost-cpp/plugin.hpp>
 
-#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -22,20 +21,14 @@ public:
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
         settings_.denoise = quality_ != "reference" && !settings_.accumulate;
-        settings_.view = static_cast<View>(std::ranges::find(views, options.text("show")) - views);
-        if (settings_.view != View::picture && !settings_.denoise)
-            throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
-                                  "option 'show': '" + options.text("show") +
-                                      "' is a view of the denoiser; use 'quality: realtime' or 'balanced', and not "
-                                      "'accumulate'");
+        settings_.view = view_of(options.text("show"), settings_.denoise);
         settings_.single_path = options.text("glass") == "path";
         settings_.photons = static_cast<std::uint32_t>(options.integer("photons"));
         if (const double bound = options.real("max_radiance"); bound > 0)
             settings_.max_radiance = static_cast<float>(bound);
         else
             settings_.max_radiance = std::numeric_limits<float>::infinity();
-        settings_.instruction_set = options.text("instruction_set");
-        choose_instruction_set(settings_.instruction_set); // throws now rather than in start() if unsupported
+        settings_.instruction_set = choose_instruction_set(options.text("instruction_set"));
     }
 
     void start(const arhost_raytracer_setup &setup) {
@@ -55,15 +48,7 @@ public:
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
         // An older host's struct lacks fields.
         const auto has = [&](std::size_t field) { return request.struct_size > field; };
-        StateSlots state; // none: images are not denoised
-        if (has(offsetof(arhost_render_request, state_size)) && request.state_size > 0) {
-            if (request.state_size < renderer_->state_size())
-                throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
-                                      "the state has " + std::to_string(request.state_size) +
-                                          " bytes; the host must provide as many as state_size() returns, " +
-                                          std::to_string(renderer_->state_size()));
-            state = {request.state_before, request.state_after};
-        }
+        const StateSlots state = state_of(request, renderer_->state_size());
         const Rectangle drawn =
             renderer_->render(request.camera, image, request.motion,
                               has(offsetof(arhost_render_request, video)) ? request.video : nullptr, request.sequence,

@@ -130,8 +130,7 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
     : host_(host), full_intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
-      intrinsics_(full_intrinsics_), kernel_(kernel_of(choose_instruction_set(settings.instruction_set))),
-      threads_(settings.threads),
+      intrinsics_(full_intrinsics_), kernel_(kernel_of(settings.instruction_set)), threads_(settings.threads),
       ray_table_(intrinsics_,
                  settings.samples > 1 || settings.accumulate || setup.scene->integrator == ARHOST_INTEGRATOR_PATH,
                  threads_),
@@ -139,8 +138,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       single_path_(settings.single_path), max_radiance_(settings.max_radiance), view_(settings.view),
       blends_codes_(setup.compositing != ARHOST_COMPOSITING_LINEAR), full_samples_(settings.samples),
-      photons_per_sample_(settings.photons), lens_(video_through(full_intrinsics_, scene_.colour_tables(),
-                                                                 full_intrinsics_.width, full_intrinsics_.height)) {
+      photons_per_sample_(settings.photons), lens_(video_through(full_intrinsics_, scene_.colour_tables())) {
     if (setup.form == ARHOST_IMAGE_FORM_LINEAR && setup.scene->integrator != ARHOST_INTEGRATOR_PATH)
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
                       "linear images need a scene with the path integrator; request straight ones");
@@ -151,8 +149,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         place_lights();
     }
     if (settings.denoise && lights_ && setup.scene->objects.count <= Denoising::most_objects)
-        denoiser_.emplace(choose_instruction_set(settings.instruction_set), full_intrinsics_.width,
-                          full_intrinsics_.height, setup.scene->objects.count,
+        denoiser_.emplace(settings.instruction_set, full_intrinsics_.width, full_intrinsics_.height,
+                          setup.scene->objects.count,
                           DenoisedScene{.has_sharp_shadows = lights_->casts_sharp_shadows(),
                                         .has_gloss = scene_.view().has_gloss,
                                         .has_specular = has_specular(scene_)});
@@ -356,7 +354,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 {},
                 light_samples_,
                 single_path_,
-                {image.rgba, image.stride, image.linear, blends_codes_, scene_.view().srgb8},
+                {image.rgba, image.stride, image.linear, blends_codes_, &scene_.colour_tables().srgb8},
                 first_random,
                 path_scene(),
                 nullptr,

@@ -30,7 +30,7 @@ struct Settings {
     bool single_path = false;        // glass spawns one random ray instead of two
     float max_radiance = 100;        // path integrator: bound of each sample; infinity: none
     std::uint32_t photons = 1 << 14; // path integrator: light rays from lamps per frame and sample, for caustics
-    std::string instruction_set = "auto";
+    InstructionSet instruction_set = choose_instruction_set("auto");
     bool denoise = false;      // path integrator
     View view = View::picture; // else it needs `denoise`
 };

@@ -11,8 +11,7 @@ namespace common = arhost::raytracer_common;
 LayerDenoiser::LayerDenoiser(const arhost_intrinsics &intrinsics, std::size_t objects, bool has_catchers,
                              bool has_gloss, bool has_specular, common::View view, unsigned threads)
     : intrinsics_(intrinsics), has_catchers_(has_catchers), view_(view),
-      lens_(common::video_through(intrinsics, colour_tables_, intrinsics.width, intrinsics.height)),
-      threads_(threads),
+      lens_(common::video_through(intrinsics, colour_tables_)), threads_(threads),
       // The device samples catchers in all pixels, so they need no larger cells.
       denoiser_(common::choose_instruction_set("auto"), intrinsics.width, intrinsics.height, objects,
                 {.has_sharp_shadows = true, .has_gloss = has_gloss, .has_specular = has_specular}) {}
@@ -49,7 +48,7 @@ void LayerDenoiser::read(const std::uint32_t *planes, std::size_t row) const {
         const std::size_t at = row * static_cast<std::size_t>(layer.guide_stride()) + common::Layer::margin;
         for (std::size_t i = 0; i < 3; ++i)
             copy(first_plane + i, layer.light[0][i] + at);
-        std::fill_n(layer.light[0][common::variance_light] + at, width, 1.0f); // sampled
+        std::fill_n(layer.light[0][common::variance_light] + at, width, common::sampled);
     };
     const auto read_layer = [&](const common::Layer &layer) {
         const std::size_t at = row * static_cast<std::size_t>(layer.guide_stride()) + common::Layer::margin;

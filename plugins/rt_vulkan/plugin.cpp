@@ -5,7 +5,6 @@
 
 #include <arhost-cpp/plugin.hpp>
 
-#include <algorithm>
 #include <cstdio>
 #include <limits>
 #include <optional>
@@ -78,12 +77,7 @@ public:
         settings_.accumulate = options.boolean("accumulate");
         settings_.denoise = quality_ != "reference" && !settings_.accumulate;
         settings_.denoiser_threads = static_cast<unsigned>(options.integer("threads"));
-        settings_.view = static_cast<View>(std::ranges::find(views, options.text("show")) - views);
-        if (settings_.view != View::picture && !settings_.denoise)
-            throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
-                                  "option 'show': '" + options.text("show") +
-                                      "' is a view of the denoiser; use 'quality: realtime' or 'balanced', and not "
-                                      "'accumulate'");
+        settings_.view = arhost::raytracer_common::view_of(options.text("show"), settings_.denoise);
         settings_.single_path = options.text("glass") == "path";
         settings_.photons = static_cast<std::uint32_t>(options.integer("photons"));
         if (const double bound = options.real("max_radiance"); bound > 0)
@@ -108,15 +102,7 @@ public:
         // An older host's struct lacks fields.
         const auto has = [&](std::size_t field) { return request.struct_size > field; };
         const arhost_frame *video = has(offsetof(arhost_render_request, video)) ? request.video : nullptr;
-        LayerDenoiser::StateSlots state; // none: images are not denoised
-        if (has(offsetof(arhost_render_request, state_size)) && request.state_size > 0) {
-            if (request.state_size < renderer_->state_size())
-                throw arhost::Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
-                                      "the state has " + std::to_string(request.state_size) +
-                                          " bytes; the host must provide as many as state_size() returns, " +
-                                          std::to_string(renderer_->state_size()));
-            state = {request.state_before, request.state_after};
-        }
+        const auto state = arhost::raytracer_common::state_of(request, renderer_->state_size());
         const Rectangle drawn =
             renderer_->render(request.camera, image, request.motion, video, request.sequence, state);
         info.has_region = 1;

@@ -3,6 +3,8 @@
 
 #include "raytracer_common/scene_geometry.hpp"
 
+#include <arhost-cpp/plugin.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -88,6 +90,26 @@ void write_motion(const float *from, const float *to, float *motion) {
 }
 
 } // namespace
+
+StateSlots state_of(const arhost_render_request &request, std::uint64_t size) {
+    // An older host's struct lacks the fields.
+    if (request.struct_size <= offsetof(arhost_render_request, state_size) || request.state_size == 0)
+        return {};
+    if (request.state_size < size)
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                      "the state has " + std::to_string(request.state_size) +
+                          " bytes; the host must provide as many as state_size() returns, " + std::to_string(size));
+    return {request.state_before, request.state_after};
+}
+
+View view_of(const std::string &show, bool denoises) {
+    const auto view = static_cast<View>(std::ranges::find(views, show) - views);
+    if (view != View::picture && !denoises)
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                      "option 'show': '" + show +
+                          "' is a view of the denoiser; use 'quality: realtime' or 'balanced', and not 'accumulate'");
+    return view;
+}
 
 Steps steps_of(InstructionSet instructions) {
     switch (instructions) {

@@ -12,7 +12,9 @@
 #include <arhost/raytracer.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace arhost::raytracer_common {
@@ -28,6 +30,13 @@ struct StateSlots {
                 after ? static_cast<std::byte *>(after) + offset : nullptr};
     }
 };
+
+// Returns the states of a request; none if it has none, as images are then not denoised. `size`: that the ray tracer
+// has declared. Throws Failure if the states of the request are smaller.
+StateSlots state_of(const arhost_render_request &request, std::uint64_t size);
+
+// Returns the value of the option `show`. Throws Failure if it needs a denoiser and there is none.
+View view_of(const std::string &show, bool denoises);
 
 // Decides which planes the denoiser has.
 struct DenoisedScene {

@@ -49,6 +49,11 @@ enum LightRow : int {
     light_rows
 };
 
+// Values of variance_light of light[0]: whether the light of a cell was sampled in this frame; if only because no
+// other cell nearby shows its surface, it counts at new surfaces only, since its random numbers are those of its
+// turn.
+inline constexpr float not_sampled = 0, sampled = 1, sampled_early = 2;
+
 // The memory of the denoiser: one value per cell of a layer.
 enum HistoryRow : int {
     moment_history = 3, // two rows: means of the luminance of the light and of its square; the light precedes
@@ -117,8 +122,8 @@ struct Denoising {
     // virtual objects; but mirrors and glass, whose history is short, always at all pixels.
     std::int32_t catcher_phase, object_phase;
     std::uint32_t number; // of the frame, without gaps
-    std::uint32_t
-        first_random_in_turn; // offset into the random sequences of pixels that are sampled in every fourth frame
+    // Offset into the random sequences of pixels that are sampled in every fourth frame.
+    std::uint32_t first_random_in_turn;
     // For each object, 12 floats: the motion from this frame to the previous one, a column-major 3×4 matrix in world
     // axes. NULL if no placement has changed.
     const float *before_from_now;

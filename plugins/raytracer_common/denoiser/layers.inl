@@ -45,11 +45,6 @@ ARHOST_INLINE Bool has_light_in(const Layer &layer, Int surface) {
                                               : is_real & (surface != Int(unchanged_surface));
 }
 
-// Values of variance_light of light[0]: whether the light of a cell was sampled in this frame; if only because no
-// other cell nearby shows its surface, it counts at new surfaces only, since its random numbers are those of its
-// turn.
-constexpr float not_sampled = 0, sampled = 1, sampled_early = 2;
-
 // A pixel at an edge has eight rays. Four bits for each tell which light it gets: that of one of the nine pixels
 // around (3 · (dy + 1) + dx + 1), or none.
 constexpr int tap_count = 8, own_tap = 4, no_tap = 15;
