@@ -125,10 +125,9 @@ scene::ArenaBuilder in_an_environment(const std::array<float, 3> &radiance, bool
         "white", builder.add_triangles({{{-900, 40, -900}, {900, 40, -900}, {0, 40, 900}}, {}, {}, {{0, 1, 2}}}),
         builder.add_material(diffuse(glm::vec3(0.8f))));
     const std::array<float, 4> texel{radiance[0], radiance[1], radiance[2], 1};
-    scene::Texture texture{
-        ARHOST_TEXEL_RGBA32F, 1, 1, ARHOST_WRAP_REPEAT, ARHOST_WRAP_CLAMP, scene::Texels::of_size(sizeof texel)};
-    std::memcpy(texture.texels.bytes.get(), texel.data(), sizeof texel);
-    builder.environment.texture = builder.add_texture("sky", std::move(texture));
+    scene::TexelImage image{ARHOST_TEXEL_RGBA32F, 1, 1, scene::Texels::of_size(sizeof texel)};
+    std::memcpy(image.texels.bytes.get(), texel.data(), sizeof texel);
+    builder.environment.texture = builder.add_texture("sky", std::move(image), {.wrap_v = ARHOST_WRAP_CLAMP});
     builder.environment.rows = builder.environment.columns = {1};
     builder.environment.follows_video = follows_video;
     return builder;

@@ -50,6 +50,7 @@ arhost_geometry put_geometry(Writer &writer, const TriangleMesh &mesh) {
     geometry.positions = writer.put(mesh.positions);
     geometry.normals = writer.put(mesh.normals);
     geometry.texcoords = writer.put(mesh.texcoords);
+    geometry.colours = writer.put(mesh.colours);
     geometry.indices = writer.put(mesh.triangles);
     geometry.joints = writer.put(mesh.joints);
     geometry.weights = writer.put(mesh.weights);
@@ -75,19 +76,20 @@ void copy(const glm::mat4x3 &from, float *to) {
         copy(from[column], to + 3 * column);
 }
 
-arhost_texture put_texture(Writer &writer, const Texture &texture, std::uint32_t name) {
+arhost_texel_image put_image(Writer &writer, const TexelImage &image, std::uint32_t name) {
     const auto texels = [&]<class Texel>(Texel) {
-        return std::span(reinterpret_cast<const Texel *>(texture.texels.bytes.get()),
-                         texture.texels.size / sizeof(Texel));
+        return std::span(reinterpret_cast<const Texel *>(image.texels.bytes.get()),
+                         image.texels.size / sizeof(Texel));
     };
-    return {texture.format,
-            texture.width,
-            texture.height,
-            texture.wrap_u,
-            texture.wrap_v,
-            name,
-            texture.format == ARHOST_TEXEL_RGBA32F ? writer.put(texels(glm::vec4()))
-                                                   : writer.put(texels(glm::u8vec4()))};
+    return {image.format, image.width, image.height, name,
+            image.format == ARHOST_TEXEL_RGBA32F ? writer.put(texels(glm::vec4()))
+                                                 : writer.put(texels(glm::u8vec4()))};
+}
+
+arhost_texture written(const Texture &texture) {
+    arhost_texture to{texture.image, texture.wrap_u, texture.wrap_v, texture.filter, texture.texcoord_set, {}};
+    std::memcpy(to.image_from_texcoord, &texture.image_from_texcoord, sizeof to.image_from_texcoord);
+    return to;
 }
 
 arhost_node put_node(Writer &writer, const MotionNode &node) {
@@ -103,11 +105,11 @@ arhost_node put_node(Writer &writer, const MotionNode &node) {
     return written;
 }
 
-arhost_channel put_channel(Writer &writer, const Channel &channel) {
+arhost_channel put_channel(Writer &writer, const Channel &channel, float duration_s) {
     return {channel.node,
             channel.target,
             channel.interpolation,
-            0,
+            channel.period_s.value_or(duration_s),
             writer.put(channel.times),
             writer.put(channel.values)};
 }
@@ -133,7 +135,13 @@ arhost_material make_material(arhost_material_model model) {
     arhost_material material{};
     material.model = model;
     material.colour_texture = material.metallic_roughness_texture = material.normal_texture =
-        material.emission_texture = ARHOST_NONE;
+        material.emission_texture = material.occlusion_texture = material.specular_texture =
+            material.specular_colour_texture = material.transmission_texture = material.clearcoat_texture =
+                material.clearcoat_roughness_texture = material.clearcoat_normal_texture = ARHOST_NONE;
+    material.opacity = material.normal_scale = material.occlusion_strength = material.specular_weight =
+        material.clearcoat_normal_scale = 1;
+    if (model == ARHOST_MATERIAL_METALLIC_ROUGHNESS)
+        copy(glm::vec3(1), material.specular);
     material.exponent = 1;
     copy(glm::vec3(1), material.reflectivity);
     material.metallic = 1;
@@ -198,10 +206,21 @@ std::uint32_t ArenaBuilder::add_name(const std::string &name) {
     return offset;
 }
 
-std::uint32_t ArenaBuilder::add_texture(const std::string &name, Texture texture) {
+std::uint32_t ArenaBuilder::add_image(const std::string &name, TexelImage image) {
+    origins_.add(Table::images);
+    images_.emplace_back(add_name(name), std::move(image));
+    return static_cast<std::uint32_t>(images_.size() - 1);
+}
+
+std::uint32_t ArenaBuilder::add_texture(const Texture &texture) {
     origins_.add(Table::textures);
-    textures_.emplace_back(add_name(name), std::move(texture));
+    textures_.push_back(texture);
     return static_cast<std::uint32_t>(textures_.size() - 1);
+}
+
+std::uint32_t ArenaBuilder::add_texture(const std::string &name, TexelImage image, Texture texture) {
+    texture.image = add_image(name, std::move(image));
+    return add_texture(texture);
 }
 
 std::uint32_t ArenaBuilder::add_node(MotionNode node) {
@@ -236,7 +255,8 @@ std::uint32_t ArenaBuilder::add_material(const arhost_material &material) {
 }
 
 std::uint32_t ArenaBuilder::add_object(const std::string &name, std::uint32_t geometry, std::uint32_t material,
-                                       arhost_role role, const glm::mat4x3 &world_from_object, const Motion &motion) {
+                                       arhost_role role, const glm::mat4x3 &world_from_object, const Motion &motion,
+                                       bool hides_back_faces) {
     origins_.add(Table::objects);
     arhost_object object{};
     object.geometry = geometry;
@@ -248,6 +268,7 @@ std::uint32_t ArenaBuilder::add_object(const std::string &name, std::uint32_t ge
     object.deforms = motion.deforms;
     object.node = motion.node;
     object.skin = motion.skin;
+    object.hides_back_faces = hides_back_faces;
     objects_.push_back(object);
     return static_cast<std::uint32_t>(objects_.size() - 1);
 }
@@ -277,10 +298,11 @@ std::size_t ArenaBuilder::byte_size() const {
     counter.put(environment.rows);
     counter.put(environment.columns);
     put_table<arhost_node>(counter, nodes_, [&](const MotionNode &node) { return put_node(counter, node); });
-    put_table<arhost_channel>(counter, channels_, [&](const Channel &c) { return put_channel(counter, c); });
+    put_table<arhost_channel>(counter, channels_, [&](const Channel &c) { return put_channel(counter, c, 0); });
     put_table<arhost_skin>(counter, skins_, [&](const Skin &skin) { return put_skin(counter, skin); });
-    put_table<arhost_texture>(counter, textures_,
-                              [&](const auto &t) { return put_texture(counter, t.second, t.first); });
+    put_table<arhost_texture>(counter, textures_, written);
+    put_table<arhost_texel_image>(counter, images_,
+                                  [&](const auto &named) { return put_image(counter, named.second, named.first); });
     put_table<arhost_geometry>(counter, geometries_, [&](const Geometry &geometry) {
         return std::visit([&](const auto &shape) { return put_geometry(counter, shape); }, geometry);
     });
@@ -324,13 +346,14 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     scene.environment.columns = writer.put(environment.columns);
     scene.nodes =
         put_table<arhost_node>(writer, nodes_, [&](const MotionNode &node) { return put_node(writer, node); });
-    scene.channels =
-        put_table<arhost_channel>(writer, channels_, [&](const Channel &c) { return put_channel(writer, c); });
+    scene.channels = put_table<arhost_channel>(
+        writer, channels_, [&](const Channel &c) { return put_channel(writer, c, settings.duration_s); });
     scene.skins = put_table<arhost_skin>(writer, skins_, [&](const Skin &skin) { return put_skin(writer, skin); });
-    scene.textures = put_table<arhost_texture>(writer, textures_, [&](auto &named) {
-        const arhost_texture texture = put_texture(writer, named.second, named.first);
+    scene.textures = put_table<arhost_texture>(writer, textures_, written);
+    scene.images = put_table<arhost_texel_image>(writer, images_, [&](auto &named) {
+        const arhost_texel_image image = put_image(writer, named.second, named.first);
         named.second.texels = {};
-        return texture;
+        return image;
     });
     scene.geometries = put_table<arhost_geometry>(writer, geometries_, [&](Geometry &geometry) {
         return std::visit(

@@ -8,6 +8,7 @@
 
 #include <arhost/scene.h>
 
+#include <glm/mat3x2.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x3.hpp>
 #include <glm/vec3.hpp>
@@ -46,11 +47,20 @@ struct Texels {
     std::span<std::byte> span() const { return {bytes.get(), size}; }
 };
 
-struct Texture {
+struct TexelImage {
     arhost_texel_format format = ARHOST_TEXEL_SRGB8;
     std::uint32_t width = 0, height = 0;
-    arhost_wrap wrap_u = ARHOST_WRAP_REPEAT, wrap_v = ARHOST_WRAP_REPEAT;
     Texels texels;
+};
+
+struct Texture {
+    std::uint32_t image = 0;
+    arhost_wrap wrap_u = ARHOST_WRAP_REPEAT, wrap_v = ARHOST_WRAP_REPEAT;
+    arhost_texel_filter filter = ARHOST_TEXEL_FILTER_LINEAR;
+    std::uint32_t texcoord_set = 0;
+    glm::mat3x2 image_from_texcoord{1};
+
+    friend bool operator==(const Texture &, const Texture &) = default;
 };
 
 struct Environment {
@@ -77,6 +87,7 @@ struct Channel {
     arhost_channel_target target = ARHOST_CHANNEL_TRANSLATION;
     arhost_interpolation interpolation = ARHOST_INTERPOLATION_LINEAR;
     std::vector<float> times, values;
+    std::optional<float> period_s{}; // absent: Settings::duration_s
 };
 
 struct Skin {
@@ -102,8 +113,8 @@ struct Settings {
 };
 
 // The tables of an arena, and the scene as a whole.
-enum class Table { scene, geometries, textures, materials, objects, lights, nodes, channels, skins, anchors };
-constexpr std::size_t table_count = 10;
+enum class Table { scene, geometries, images, textures, materials, objects, lights, nodes, channels, skins, anchors };
+constexpr std::size_t table_count = 11;
 
 // A violation of the rules in arhost/scene.h, for example "object 2 'ball' refers to material 7, but the scene has
 // only 3".
@@ -167,11 +178,15 @@ public:
     // Each function returns the index of the new element.
     std::uint32_t add_triangles(TriangleMesh mesh);
     std::uint32_t add_spheres(Spheres spheres);
-    std::uint32_t add_texture(const std::string &name, Texture texture);
+    std::uint32_t add_image(const std::string &name, TexelImage image);
+    std::uint32_t add_texture(const Texture &texture);
+    // Adds an image, and `texture` to show it.
+    std::uint32_t add_texture(const std::string &name, TexelImage image, Texture texture = {});
     std::uint32_t add_material(const arhost_material &material);
     std::uint32_t add_object(const std::string &name, std::uint32_t geometry, std::uint32_t material,
                              arhost_role role = ARHOST_ROLE_VIRTUAL,
-                             const glm::mat4x3 &world_from_object = glm::mat4x3(1), const Motion &motion = {});
+                             const glm::mat4x3 &world_from_object = glm::mat4x3(1), const Motion &motion = {},
+                             bool hides_back_faces = false);
     std::uint32_t add_light(const arhost_light &light);
     std::uint32_t add_node(MotionNode node);
     std::uint32_t add_channel(Channel channel);
@@ -190,7 +205,8 @@ public:
     std::size_t object_count() const { return objects_.size(); }
     std::size_t triangle_count() const;
     const arhost_material &material(std::uint32_t index) const { return materials_[index]; }
-    const Texture &texture(std::uint32_t index) const { return textures_[index].second; }
+    const TexelImage &image_of_texture(std::uint32_t index) const { return images_[textures_[index].image].second; }
+    const Texture &texture(std::uint32_t index) const { return textures_[index]; }
 
 private:
     using Geometry = std::variant<TriangleMesh, Spheres>;
@@ -199,7 +215,8 @@ private:
     void apply_initial_motion(std::span<std::byte> arena) const;
 
     std::vector<Geometry> geometries_;
-    std::vector<std::pair<std::uint32_t, Texture>> textures_; // first: offset of the name in `names`
+    std::vector<std::pair<std::uint32_t, TexelImage>> images_; // first: offset of the name in `names`
+    std::vector<Texture> textures_;
     std::vector<arhost_material> materials_;
     std::vector<arhost_object> objects_;
     std::vector<arhost_light> lights_;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/capabilities.hpp"
 
+#include "scene/material_textures.hpp"
 #include "scene/motion.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -31,13 +31,13 @@ std::uint64_t needed_for(const arhost_material &material, arhost_integrator inte
         break;
     case ARHOST_MATERIAL_METALLIC_ROUGHNESS:
         needed = ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS;
+        if (material.transmission > 0 && integrator == ARHOST_INTEGRATOR_PATH)
+            needed |= ARHOST_RAYTRACER_CAPABILITY_GLASS;
         break;
     default:
         break;
     }
-    const std::array textures = {material.colour_texture, material.metallic_roughness_texture,
-                                 material.normal_texture, material.emission_texture};
-    if (std::ranges::any_of(textures, [](std::uint32_t texture) { return texture != ARHOST_NONE; }))
+    if (std::ranges::any_of(textures_of(material), [](std::uint32_t texture) { return texture != ARHOST_NONE; }))
         needed |= ARHOST_RAYTRACER_CAPABILITY_TEXTURES;
     return needed;
 }

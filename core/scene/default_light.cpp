@@ -12,7 +12,7 @@ namespace arhost::scene {
 
 // The direction of the light is unknown. Of the lamps tried in tools/bench truth, one at the zenith with these shares
 // is the best in the mean of the rooms.
-Texture default_light() {
+TexelImage default_light() {
     constexpr std::uint32_t height = 64;
     constexpr double mean_reflectance = 0.35, share_of_lamp = 0.5;
     const double lamp_begin = std::cos(45 * std::numbers::pi / 180),
@@ -28,21 +28,16 @@ Texture default_light() {
         irradiance_of_lamp +=
             lamp(cosine_of_row(row)) * cosine_of_row(row) * solid_angle_of_row(row) * std::numbers::inv_pi;
 
-    Texture texture{ARHOST_TEXEL_RGBA32F,
-                    1,
-                    height,
-                    ARHOST_WRAP_REPEAT,
-                    ARHOST_WRAP_CLAMP,
-                    Texels::of_size(height * 4 * sizeof(float))};
+    TexelImage image{ARHOST_TEXEL_RGBA32F, 1, height, Texels::of_size(height * 4 * sizeof(float))};
     for (std::uint32_t row = 0; row < height; ++row) {
         const double cosine = cosine_of_row(row);
         const double above =
             (1 - share_of_lamp + share_of_lamp * lamp(cosine) / irradiance_of_lamp) / mean_reflectance;
         const auto radiance = static_cast<float>(glm::mix(1.0, above, glm::smoothstep(-0.1, 0.1, cosine)));
         const std::array texel{radiance, radiance, radiance, 1.0f};
-        std::memcpy(texture.texels.bytes.get() + row * sizeof texel, texel.data(), sizeof texel);
+        std::memcpy(image.texels.bytes.get() + row * sizeof texel, texel.data(), sizeof texel);
     }
-    return texture;
+    return image;
 }
 
 } // namespace arhost::scene

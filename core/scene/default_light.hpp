@@ -11,6 +11,6 @@ namespace arhost::scene {
 // and a uniform sky bring half of the irradiance of a horizontal surface each; the mean light of the video is below
 // the horizon. A surface that reflects 35 % of the irradiance, about the mean of rooms, has the mean radiance of the
 // video.
-Texture default_light();
+TexelImage default_light();
 
 } // namespace arhost::scene

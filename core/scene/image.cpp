@@ -169,16 +169,16 @@ Image linearized(Image image, const Reporter &reporter) {
     return linear;
 }
 
-void add_cumulative_sums(Environment &environment, const Texture &texture, const Reporter &reporter) {
-    const std::span<const float> texels = floats_of(texture.texels);
-    environment.rows.resize(texture.height);
-    environment.columns.resize(std::size_t(texture.width) * texture.height);
-    const std::size_t width = texture.width, height = texture.height;
+void add_cumulative_sums(Environment &environment, const TexelImage &image, const Reporter &reporter) {
+    const std::span<const float> texels = floats_of(image.texels);
+    environment.rows.resize(image.height);
+    environment.columns.resize(std::size_t(image.width) * image.height);
+    const std::size_t width = image.width, height = image.height;
     // The mean of the bilinear interpolation over a texel has the weights 1, 6 and 1 along each axis.
     const auto mean = [](double before, double here, double after) { return (before + 6 * here + after) / 8; };
     std::vector<double> by_column(width), luminance(width), row_sums(height);
     for (std::size_t row = 0; row < height; ++row) {
-        reporter.report(static_cast<double>(row) / texture.height);
+        reporter.report(static_cast<double>(row) / image.height);
         for (std::size_t column = 0; column < width; ++column) {
             const auto at = [&](std::size_t y) {
                 const float *t = &texels[4 * (y * width + column)];
@@ -190,8 +190,8 @@ void add_cumulative_sums(Environment &environment, const Texture &texture, const
         for (std::size_t column = 0; column < width; ++column)
             sum += luminance[column] =
                 mean(by_column[(column + width - 1) % width], by_column[column], by_column[(column + 1) % width]);
-        accumulate(luminance, std::span(environment.columns).subspan(row * texture.width, texture.width));
-        row_sums[row] = sum * std::sin(std::numbers::pi * (static_cast<double>(row) + 0.5) / texture.height);
+        accumulate(luminance, std::span(environment.columns).subspan(row * image.width, image.width));
+        row_sums[row] = sum * std::sin(std::numbers::pi * (static_cast<double>(row) + 0.5) / image.height);
     }
     accumulate(row_sums, environment.rows);
 }

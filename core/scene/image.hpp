@@ -33,8 +33,7 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
 Image linearized(Image image, const Reporter &reporter);
 
 // Sets `rows` and `columns` to cumulative sums of luminance · sin(πv), for importance sampling. The luminance is the
-// mean over a texel of the texture as ray tracers interpolate it. `texture` must be RGBA32F and repeat only
-// horizontally.
-void add_cumulative_sums(Environment &environment, const Texture &texture, const Reporter &reporter);
+// mean over a texel of the image as ray tracers interpolate it. `image` must be RGBA32F.
+void add_cumulative_sums(Environment &environment, const TexelImage &image, const Reporter &reporter);
 
 } // namespace arhost::scene

@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -40,6 +41,31 @@ glm::vec3 unit(const glm::dvec3 &v) {
 }
 
 } // namespace
+
+bool is_closed(const TriangleMesh &mesh) {
+    const std::vector<std::uint32_t> same = welded(mesh.positions);
+    const auto edge = [](std::uint64_t from, std::uint64_t to) { return from << 32 | to; };
+    std::vector<std::uint64_t> edges, reversed;
+    edges.reserve(3 * mesh.triangles.size());
+    double six_volumes = 0;
+    for (const glm::uvec3 &t : mesh.triangles) {
+        const std::uint32_t a = same[t.x], b = same[t.y], c = same[t.z];
+        if (a == b || b == c || c == a)
+            continue;
+        for (const std::uint64_t e : {edge(a, b), edge(b, c), edge(c, a)})
+            edges.push_back(e);
+        const glm::dvec3 origin = mesh.positions.front();
+        six_volumes +=
+            glm::dot(glm::dvec3(mesh.positions[a]) - origin,
+                     glm::cross(glm::dvec3(mesh.positions[b]) - origin, glm::dvec3(mesh.positions[c]) - origin));
+    }
+    reversed.reserve(edges.size());
+    for (const std::uint64_t e : edges)
+        reversed.push_back(edge(e & ARHOST_NONE, e >> 32));
+    std::ranges::sort(edges);
+    std::ranges::sort(reversed);
+    return edges == reversed && six_volumes > 0;
+}
 
 std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh) {
     const std::vector<std::uint32_t> same = welded(mesh.positions);

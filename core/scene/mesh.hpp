@@ -17,8 +17,9 @@ namespace arhost::scene {
 struct TriangleMesh {
     std::vector<glm::vec3> positions;
     std::vector<glm::vec3> normals;   // one per vertex, unit length; empty: flat shading
-    std::vector<glm::vec2> texcoords; // one per vertex, or empty
+    std::vector<glm::vec2> texcoords; // of set 0, one per vertex; then of set 1, …; or empty
     std::vector<glm::uvec3> triangles;
+    std::vector<glm::u16vec4> colours{}; // linear RGB and opacity, one per vertex, or empty
     // Empty unless the mesh deforms. The layout is that of arhost_geometry.
     std::vector<glm::u16vec4> joints{};
     std::vector<glm::vec4> weights{};
@@ -35,6 +36,10 @@ public:
 // Returns one normal per vertex: the area-weighted mean of the normals of its triangles. Vertices at the same
 // position get the same normal, so texture seams do not show in the shading.
 std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh);
+
+// Returns whether each edge joins two triangles of the same orientation, and the mesh is not inside out: its back
+// faces are then visible only from inside. Vertices at the same position are one.
+bool is_closed(const TriangleMesh &mesh);
 
 // Applies `smooth` as described at MeshOptions::smooth, normalizes all normals, and computes those that are missing
 // or have length 0.

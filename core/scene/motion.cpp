@@ -115,8 +115,7 @@ MotionEvaluator::MotionEvaluator(const arhost_scene &scene)
 }
 
 arhost_motion MotionEvaluator::at(double time_s, std::span<const Anchored> anchors) {
-    const double within = std::isfinite(time_s) && scene_.duration_s > 0 ? std::fmod(time_s, scene_.duration_s) : 0;
-    evaluate_nodes(static_cast<float>(within < 0 ? within + scene_.duration_s : within), anchors);
+    evaluate_nodes(std::isfinite(time_s) ? time_s : 0, anchors);
     const auto objects = view<arhost_object>(scene_.objects);
     for (arhost_moved_object &moved : moved_) {
         moved.is_visible = is_visible(objects[moved.object]);
@@ -138,7 +137,7 @@ bool MotionEvaluator::is_visible(const arhost_object &object) const {
     return node == ARHOST_NONE || node_is_visible_[node];
 }
 
-void MotionEvaluator::evaluate_nodes(float time_s, std::span<const Anchored> anchors) {
+void MotionEvaluator::evaluate_nodes(double time_s, std::span<const Anchored> anchors) {
     const auto nodes = view<arhost_node>(scene_.nodes);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         Pose &pose = poses_[i];
@@ -167,9 +166,13 @@ void MotionEvaluator::evaluate_nodes(float time_s, std::span<const Anchored> anc
     }
 }
 
-void MotionEvaluator::apply(const arhost_channel &channel, float time_s) {
+void MotionEvaluator::apply(const arhost_channel &channel, double time_s) {
     Pose &pose = poses_[channel.node];
-    const Interval interval = interval_of(view<float>(channel.times), time_s);
+    if (channel.period_s > 0) {
+        time_s = std::fmod(time_s, channel.period_s);
+        time_s += time_s < 0 ? channel.period_s : 0;
+    }
+    const Interval interval = interval_of(view<float>(channel.times), static_cast<float>(time_s));
     const std::size_t width = channel.target == ARHOST_CHANNEL_ROTATION        ? 4
                               : channel.target == ARHOST_CHANNEL_MORPH_WEIGHTS ? pose.morph_weights.size()
                                                                                : 3;
@@ -256,16 +259,18 @@ void MotionEvaluator::skin(const arhost_geometry &geometry, const arhost_skin &s
     }
     const auto vertex_joints = view<glm::u16vec4>(geometry.joints);
     const auto vertex_weights = view<glm::vec4>(geometry.weights);
-    for (std::size_t v = 0; v < vertex_joints.size(); ++v) {
+    const std::size_t vertices = geometry.positions.count;
+    for (std::size_t v = 0; v < vertices; ++v) {
         Matrix m{};
-        for (int j = 0; j < 4; ++j) {
-            const float weight = vertex_weights[v][j];
-            if (weight == 0)
-                continue;
-            const Matrix &joint = world_from_mesh[vertex_joints[v][j]];
-            for (int k = 0; k < 12; ++k)
-                m[k] += weight * joint[k];
-        }
+        for (std::size_t set = v; set < vertex_joints.size(); set += vertices)
+            for (int j = 0; j < 4; ++j) {
+                const float weight = vertex_weights[set][j];
+                if (weight == 0)
+                    continue;
+                const Matrix &joint = world_from_mesh[vertex_joints[set][j]];
+                for (int k = 0; k < 12; ++k)
+                    m[k] += weight * joint[k];
+            }
         float *p = &into.positions[3 * v];
         const glm::vec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
         const glm::vec3 world = x * p[0] + y * p[1] + z * p[2] + glm::vec3(m[9], m[10], m[11]);

@@ -33,7 +33,7 @@ class MotionEvaluator {
 public:
     explicit MotionEvaluator(const arhost_scene &scene);
 
-    // Returns the motion at `time_s`; the animation repeats with the period duration_s of the scene. `anchors`: one
+    // Returns the motion at `time_s`. Before 0 s, animations that play once show their first values. `anchors`: one
     // element for each anchor of the scene. If it is empty, the anchors are at the origin of the world. The result is
     // valid until the next call.
     arhost_motion at(double time_s, std::span<const Anchored> anchors = {});
@@ -54,9 +54,9 @@ private:
         return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene_) + buffer.offset),
                 buffer.count};
     }
-    void evaluate_nodes(float time_s, std::span<const Anchored> anchors);
+    void evaluate_nodes(double time_s, std::span<const Anchored> anchors);
     bool is_visible(const arhost_object &object) const;
-    void apply(const arhost_channel &channel, float time_s);
+    void apply(const arhost_channel &channel, double time_s);
     void deform(const arhost_object &object, Deformed &into) const;
     void skin(const arhost_geometry &geometry, const arhost_skin &skin, Deformed &into) const;
 

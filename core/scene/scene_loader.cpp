@@ -3,7 +3,8 @@
 
 #include "scene/box.hpp"
 #include "scene/default_light.hpp"
-#include "scene/gltf.hpp"
+#include "scene/gltf/gltf.hpp"
+#include "scene/material_textures.hpp"
 #include "scene/mesh_loader.hpp"
 #include "scene/shapes.hpp"
 #include "scene/stand_in.hpp"
@@ -219,9 +220,9 @@ std::uint32_t texture_or_none(const Node &material, std::string_view key, bool i
         image = node->require("image");
         if (const auto wrap = node->find("wrap")) {
             const std::string text = wrap->choice({"repeat", "clamp", "mirror"});
-            use.wrap_u = use.wrap_v = text == "repeat"  ? ARHOST_WRAP_REPEAT
-                                      : text == "clamp" ? ARHOST_WRAP_CLAMP
-                                                        : ARHOST_WRAP_MIRROR;
+            use.lookup.wrap_u = use.lookup.wrap_v = text == "repeat"  ? ARHOST_WRAP_REPEAT
+                                                    : text == "clamp" ? ARHOST_WRAP_CLAMP
+                                                                      : ARHOST_WRAP_MIRROR;
         }
         if (const auto encoding = node->find("encoding"))
             use.is_colour = encoding->choice({"srgb", "linear"}) == "srgb";
@@ -645,13 +646,16 @@ private:
     void set_origin(const Node &node) { builder_.set_origin(node.where() + ": " + node.path()); }
 
     void add_object(const Node &node, std::size_t index, std::size_t count) {
-        node.allow_keys({"name", "mesh", "gltf", "animation", "smooth", "stand_in", "sphere", "cuboid", "plane",
-                         "transform", "motion", "material", "role", "on"});
+        node.allow_keys({"name", "mesh", "gltf", "animation", "loop", "speed", "variant", "smooth", "stand_in",
+                         "sphere", "cuboid", "plane", "transform", "motion", "material", "role", "on"});
         const std::string shape_key = shape_key_of(node);
         const Node shape = node.require(shape_key);
         for (const char *key : {"smooth", "stand_in"})
             if (const auto of_mesh = node.find(key); of_mesh && shape_key != "mesh")
                 of_mesh->fail("is only allowed with 'mesh'");
+        for (const char *key : {"variant", "loop", "speed"})
+            if (const auto of_gltf = node.find(key); of_gltf && shape_key != "gltf")
+                of_gltf->fail("is only allowed with 'gltf'");
         if (const auto animation = node.find("animation"); animation && shape_key != "gltf")
             animation->fail("is only allowed with 'gltf'; use 'motion' for other objects");
         const std::string name = name_of(node, shape_key + " " + std::to_string(index));
@@ -674,7 +678,12 @@ private:
             const Transform to_scene_axes =
                 builder_.settings.axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
             add_gltf_file(node, shape,
-                          {name, world_from_object * to_scene_axes, motion_node, role, material, {}, readable_},
+                          {.name = name,
+                           .from_gltf = world_from_object * to_scene_axes,
+                           .node = motion_node,
+                           .role = role,
+                           .material = material,
+                           .reads = readable_},
                           part);
         } else {
             const std::uint32_t geometry = add_geometry(node, shape_key, shape, world_from_object, *material, part);
@@ -723,13 +732,27 @@ private:
     void add_gltf_file(const Node &object, const Node &path, GltfPlacement placement,
                        const LoadCallbacks &callbacks) {
         const auto animation = object.find("animation");
-        if (animation)
-            placement.animation = animation->text();
+        if (animation && animation->is_sequence())
+            for (const Node &one : animation->items())
+                placement.animations.push_back(one.text());
+        else if (animation)
+            placement.animations = {animation->text()};
+        for (const char *key : {"loop", "speed"})
+            if (const auto of_animation = object.find(key); of_animation && !animation)
+                of_animation->fail("is only allowed with 'animation'");
+        if (const auto loop = object.find("loop"))
+            placement.loops = loop->boolean();
+        placement.speed = real_or(object, "speed", 0.001, 1000, 1);
+        const auto variant = object.find("variant");
+        if (variant)
+            placement.variant = variant->text();
         try {
             const float duration = add_gltf(builder_, textures_, path.input_path(), placement, callbacks);
             builder_.settings.duration_s = std::max(builder_.settings.duration_s, duration);
         } catch (const AnimationError &error) {
             animation->fail(error.what());
+        } catch (const VariantError &error) {
+            variant->fail(error.what());
         } catch (const MeshError &error) {
             path.fail(error.what());
         } catch (const ImageError &error) {
@@ -739,8 +762,7 @@ private:
 
     void check_texcoords(const Node &shape, std::uint32_t material_index, bool has_texcoords) const {
         const arhost_material &material = builder_.material(material_index);
-        for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
-                                            material.normal_texture, material.emission_texture})
+        for (const std::uint32_t texture : textures_of(material))
             if (texture != ARHOST_NONE && !has_texcoords)
                 shape.fail("has no texture coordinates, so its material cannot have textures; give it another "
                            "material, or a mesh with texture coordinates");

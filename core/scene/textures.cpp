@@ -26,41 +26,42 @@ LoadCallbacks Textures::image_callbacks() const {
 std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse &use,
                             std::span<const unsigned char> content, const std::string &part) {
     const std::string name = file.lexically_normal().string() + part;
-    const auto [known, is_new] =
-        known_.try_emplace(name + '\n' + char('0' + use.is_colour) + char('0' + use.wrap_u) + char('0' + use.wrap_v));
-    if (!is_new)
-        return known->second;
-    const LoadCallbacks callbacks = image_callbacks();
-    Image image = read_image(file, content, Reporter(callbacks, file.filename().string()));
-    Texture texture{image.is_float  ? ARHOST_TEXEL_RGBA32F
-                    : use.is_colour ? ARHOST_TEXEL_SRGB8
-                                    : ARHOST_TEXEL_RGBA8,
-                    image.width,
-                    image.height,
-                    use.wrap_u,
-                    use.wrap_v,
-                    std::move(image.texels)};
-    return known->second = builder_.add_texture(printable(name), std::move(texture));
+    const auto [image, is_new] = images_.try_emplace(name + (use.is_colour ? "\nsRGB" : "\nlinear"));
+    if (is_new) {
+        const LoadCallbacks callbacks = image_callbacks();
+        Image read = read_image(file, content, Reporter(callbacks, file.filename().string()));
+        const arhost_texel_format format = read.is_float   ? ARHOST_TEXEL_RGBA32F
+                                           : use.is_colour ? ARHOST_TEXEL_SRGB8
+                                                           : ARHOST_TEXEL_RGBA8;
+        image->second =
+            builder_.add_image(printable(name), {format, read.width, read.height, std::move(read.texels)});
+    }
+    Texture texture = use.lookup;
+    texture.image = image->second;
+    for (const auto &[known, index] : textures_)
+        if (known == texture)
+            return index;
+    textures_.emplace_back(texture, builder_.add_texture(texture));
+    return textures_.back().second;
 }
 
 Environment Textures::add_environment(const std::filesystem::path &file) {
     const LoadCallbacks callbacks = image_callbacks();
     const Reporter reporter(callbacks, file.filename().string());
     Image image = linearized(read_image(file, {}, reporter), reporter);
-    Texture texture{ARHOST_TEXEL_RGBA32F, image.width,       image.height,
-                    ARHOST_WRAP_REPEAT,   ARHOST_WRAP_CLAMP, std::move(image.texels)};
-    return add_environment(printable(file.string()), std::move(texture), reporter);
+    return add_environment(printable(file.string()),
+                           {ARHOST_TEXEL_RGBA32F, image.width, image.height, std::move(image.texels)}, reporter);
 }
 
-Environment Textures::add_environment(const std::string &name, Texture texture) {
+Environment Textures::add_environment(const std::string &name, TexelImage image) {
     const LoadCallbacks callbacks = image_callbacks();
-    return add_environment(name, std::move(texture), Reporter(callbacks, name));
+    return add_environment(name, std::move(image), Reporter(callbacks, name));
 }
 
-Environment Textures::add_environment(const std::string &name, Texture texture, const Reporter &reporter) {
+Environment Textures::add_environment(const std::string &name, TexelImage image, const Reporter &reporter) {
     Environment environment;
-    add_cumulative_sums(environment, texture, reporter);
-    environment.texture = builder_.add_texture(name, std::move(texture));
+    add_cumulative_sums(environment, image, reporter);
+    environment.texture = builder_.add_texture(name, std::move(image), {.wrap_v = ARHOST_WRAP_CLAMP});
     return environment;
 }
 

@@ -11,31 +11,32 @@ namespace arhost::scene {
 
 struct TextureUse {
     bool is_colour = true; // false: linear data, not sRGB-encoded
-    arhost_wrap wrap_u = ARHOST_WRAP_REPEAT, wrap_v = ARHOST_WRAP_REPEAT;
+    Texture lookup{};      // `image` is ignored
 };
 
 class Textures {
 public:
     Textures(ArenaBuilder &builder, const LoadCallbacks &callbacks) : builder_(builder), callbacks_(callbacks) {}
 
-    // Loads an image and returns the index of its texture. Loads the same image with the same `use` only once. If the
-    // image is embedded in `file`, `content` must have its bytes, and `part` must identify it within the file. Throws
-    // ImageError.
+    // Loads an image and returns the index of its texture. Loads the same image with the same encoding only once. If
+    // the image is embedded in `file`, `content` must have its bytes, and `part` must identify it within the file.
+    // Throws ImageError.
     std::uint32_t add(const std::filesystem::path &file, const TextureUse &use,
                       std::span<const unsigned char> content = {}, const std::string &part = "");
 
     // Loads an environment map and computes its cumulative sums. Throws ImageError.
     Environment add_environment(const std::filesystem::path &file);
-    // Adds an environment map (RGBA32F, repeats only horizontally) and computes its cumulative sums.
-    Environment add_environment(const std::string &name, Texture texture);
+    // Adds an environment map (RGBA32F) and computes its cumulative sums.
+    Environment add_environment(const std::string &name, TexelImage image);
 
 private:
     LoadCallbacks image_callbacks() const;
-    Environment add_environment(const std::string &name, Texture texture, const Reporter &reporter);
+    Environment add_environment(const std::string &name, TexelImage image, const Reporter &reporter);
 
     ArenaBuilder &builder_;
     const LoadCallbacks &callbacks_;
-    std::map<std::string, std::uint32_t> known_;
+    std::map<std::string, std::uint32_t> images_; // key: name and encoding
+    std::vector<std::pair<Texture, std::uint32_t>> textures_;
 };
 
 } // namespace arhost::scene

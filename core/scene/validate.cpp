@@ -2,6 +2,7 @@
 #include "scene/arena_builder.hpp"
 
 #include "scene/box.hpp"
+#include "scene/material_textures.hpp"
 #include "scene/motion.hpp"
 
 #include <arhost/tracker.h>
@@ -19,7 +20,6 @@
 namespace arhost::scene {
 namespace {
 
-constexpr float extinction_limit = 1e6f;
 // Tolerance for rounding errors in lengths, sums of weights, and bounds.
 constexpr float tolerance = 1e-3f;
 
@@ -86,6 +86,7 @@ public:
     void run() {
         check_header();
         geometries_ = view<arhost_geometry>(scene_->geometries, "the table of geometries");
+        images_ = view<arhost_texel_image>(scene_->images, "the table of images");
         textures_ = view<arhost_texture>(scene_->textures, "the table of textures");
         materials_ = view<arhost_material>(scene_->materials, "the table of materials");
         objects_ = view<arhost_object>(scene_->objects, "the table of objects");
@@ -105,6 +106,7 @@ public:
         find_deformers();
         for_each(Table::geometries, geometries_.size(), [&](std::size_t i) { check_deformer(i); });
         for_each(Table::textures, textures_.size(), [&](std::size_t i) { check_texture(i); });
+        for_each(Table::images, images_.size(), [&](std::size_t i) { check_image(i); });
         check_environment();
         for_each(Table::lights, lights_.size(), [&](std::size_t i) { check_light(i); });
         std::vector<Box> boxes;
@@ -209,11 +211,14 @@ private:
         };
         in_table(object.geometry, geometries_.size(), "geometry");
         in_table(object.material, materials_.size(), "material");
-        const arhost_material &material = materials_[object.material];
-        for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
-                                            material.normal_texture, material.emission_texture})
-            if (texture != ARHOST_NONE && geometries_[object.geometry].texcoords.count == 0)
-                fail(name_of(i) + " has a textured material, but its geometry has no texcoords");
+        const arhost_geometry &geometry = geometries_[object.geometry];
+        for (const std::uint32_t texture : textures_of(materials_[object.material]))
+            if (texture != ARHOST_NONE &&
+                textures_[texture].texcoord_set >= geometry.texcoords.count / std::max(geometry.positions.count, 1u))
+                fail(name_of(i) + " has a material with a texture of texcoord set " +
+                     std::to_string(textures_[texture].texcoord_set) + ", but its geometry has no such set");
+        if (object.reserved != 0)
+            fail(name_of(i) + ": a reserved field is not 0");
         if (object.role < ARHOST_ROLE_VIRTUAL || object.role > ARHOST_ROLE_OCCLUDER)
             fail(name_of(i) + " has an unknown role");
         const float *m = object.world_from_object;
@@ -269,22 +274,34 @@ private:
     void check_texture(std::size_t i) {
         const arhost_texture &texture = textures_[i];
         const std::string what = "texture " + std::to_string(i) + ": ";
-        if (texture.format < ARHOST_TEXEL_SRGB8 || texture.format > ARHOST_TEXEL_RGBA32F)
-            fail(what + "its format is unknown");
+        if (texture.image >= images_.size())
+            fail(what + "it refers to image " + std::to_string(texture.image) + ", but the scene has only " +
+                 std::to_string(images_.size()));
         for (const arhost_wrap wrap : {texture.wrap_u, texture.wrap_v})
             if (wrap < ARHOST_WRAP_REPEAT || wrap > ARHOST_WRAP_MIRROR)
                 fail(what + "its wrap mode is unknown");
-        if (texture.name >= names_.size())
+        if (texture.filter < ARHOST_TEXEL_FILTER_LINEAR || texture.filter > ARHOST_TEXEL_FILTER_NEAREST)
+            fail(what + "its filter is unknown");
+        check_floats(texture.image_from_texcoord, -coordinate_limit_mm, coordinate_limit_mm,
+                     what + "image_from_texcoord");
+    }
+
+    void check_image(std::size_t i) {
+        const arhost_texel_image &image = images_[i];
+        const std::string what = "image " + std::to_string(i) + ": ";
+        if (image.format < ARHOST_TEXEL_SRGB8 || image.format > ARHOST_TEXEL_RGBA32F)
+            fail(what + "its format is unknown");
+        if (image.name >= names_.size())
             fail(what + "its name is outside the table of names");
-        if (texture.width - 1 >= texture_side_limit || texture.height - 1 >= texture_side_limit)
-            fail(what + "it has " + std::to_string(texture.width) + " x " + std::to_string(texture.height) +
+        if (image.width - 1 >= texture_side_limit || image.height - 1 >= texture_side_limit)
+            fail(what + "it has " + std::to_string(image.width) + " x " + std::to_string(image.height) +
                  " texels; each side must have 1 to " + std::to_string(texture_side_limit));
-        if (texture.texels.count != std::uint64_t(texture.width) * texture.height)
-            fail(what + "it has " + std::to_string(texture.texels.count) + " texels for " +
-                 std::to_string(texture.width) + " x " + std::to_string(texture.height));
-        if (texture.format != ARHOST_TEXEL_RGBA32F) {
-            view<std::uint32_t>(texture.texels, what + "the buffer of texels");
-        } else if (const auto texels = floats_of(view<glm::vec4>(texture.texels, what + "the buffer of texels"));
+        if (image.texels.count != std::uint64_t(image.width) * image.height)
+            fail(what + "it has " + std::to_string(image.texels.count) + " texels for " +
+                 std::to_string(image.width) + " x " + std::to_string(image.height));
+        if (image.format != ARHOST_TEXEL_RGBA32F) {
+            view<std::uint32_t>(image.texels, what + "the buffer of texels");
+        } else if (const auto texels = floats_of(view<glm::vec4>(image.texels, what + "the buffer of texels"));
                    !all_radiances(texels)) {
             for (std::size_t t = 0; t < texels.size(); ++t)
                 if (!all_radiances(texels.subspan(t, 1)))
@@ -304,9 +321,9 @@ private:
         if (environment.texture >= textures_.size())
             fail("the environment refers to texture " + std::to_string(environment.texture) +
                  ", but the scene has only " + std::to_string(textures_.size()));
-        const arhost_texture &texture = textures_[environment.texture];
-        if (texture.format != ARHOST_TEXEL_RGBA32F)
-            fail("the environment's texture is not RGBA32F");
+        const arhost_texel_image &image = images_[textures_[environment.texture].image];
+        if (image.format != ARHOST_TEXEL_RGBA32F)
+            fail("the environment's image is not RGBA32F");
         check_floats({&environment.intensity, 1}, 0, radiance_limit, "the environment's intensity");
         const float *m = environment.environment_from_world;
         check_floats(environment.environment_from_world, -1 - tolerance, 1 + tolerance,
@@ -315,13 +332,13 @@ private:
         if (!(glm::length(glm::cross(x, y) - z) <= tolerance && glm::length(glm::cross(y, z) - x) <= tolerance &&
               glm::length(glm::cross(z, x) - y) <= tolerance && is_unit({m, 3})))
             fail("environment_from_world is not a rotation");
-        if (rows.size() != texture.height || columns.size() != texture.texels.count)
+        if (rows.size() != image.height || columns.size() != image.texels.count)
             fail("the environment has " + std::to_string(rows.size()) + " rows and " +
-                 std::to_string(columns.size()) + " columns for a texture of " + std::to_string(texture.width) +
-                 " x " + std::to_string(texture.height));
+                 std::to_string(columns.size()) + " columns for a texture of " + std::to_string(image.width) + " x " +
+                 std::to_string(image.height));
         check_cumulative(rows, "the environment's rows");
         for (std::size_t row = 0; row < rows.size(); ++row)
-            check_cumulative(columns.subspan(row * texture.width, texture.width), "the environment's columns");
+            check_cumulative(columns.subspan(row * image.width, image.width), "the environment's columns");
     }
 
     static void check_cumulative(std::span<const float> sums, const char *what) {
@@ -378,8 +395,7 @@ private:
             fail(what + "its target is unknown");
         if (channel.interpolation < ARHOST_INTERPOLATION_STEP || channel.interpolation > ARHOST_INTERPOLATION_CUBIC)
             fail(what + "its interpolation is unknown");
-        if (channel.reserved != 0)
-            fail(what + "a reserved field is not 0");
+        check_floats({&channel.period_s, 1}, 0, duration_limit_s, what + "period_s");
         const bool weights = channel.target == ARHOST_CHANNEL_MORPH_WEIGHTS;
         if (!weights && !nodes_[channel.node].animated)
             fail(what + "its node is not animated");
@@ -422,20 +438,29 @@ private:
     void check_material(std::size_t i) {
         const arhost_material &material = materials_[i];
         const std::string what = "material " + std::to_string(i) + ": ";
-        if (material.model < ARHOST_MATERIAL_DIFFUSE || material.model > ARHOST_MATERIAL_METALLIC_ROUGHNESS)
+        if (material.model < ARHOST_MATERIAL_DIFFUSE || material.model > ARHOST_MATERIAL_UNLIT)
             fail(what + "its model is unknown");
-        for (const std::uint32_t texture : {material.colour_texture, material.metallic_roughness_texture,
-                                            material.normal_texture, material.emission_texture})
+        for (const std::uint32_t texture : textures_of(material))
             if (texture != ARHOST_NONE && texture >= textures_.size())
                 fail(what + "it refers to texture " + std::to_string(texture) + ", but the scene has only " +
                      std::to_string(textures_.size()));
         check_floats(material.ambient, 0, 1, what + "ambient");
         check_floats(material.diffuse, 0, 1, what + "diffuse");
-        check_floats(material.specular, 0, 1, what + "specular");
+        const bool is_rough = material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS;
+        check_floats(material.specular, 0, is_rough ? radiance_limit : 1, what + "specular");
         check_floats(material.reflectivity, 0, 1, what + "reflectivity");
         check_floats({&material.exponent, 1}, 1, coordinate_limit_mm, what + "exponent");
         check_floats(material.emission, 0, radiance_limit, what + "emission");
+        check_floats({&material.opacity, 1}, 0, 1, what + "opacity");
         check_floats({&material.alpha_cutoff, 1}, 0, 1, what + "alpha_cutoff");
+        check_floats({&material.normal_scale, 1}, -coordinate_limit_mm, coordinate_limit_mm, what + "normal_scale");
+        check_floats({&material.occlusion_strength, 1}, 0, 1, what + "occlusion_strength");
+        check_floats({&material.specular_weight, 1}, 0, 1, what + "specular_weight");
+        check_floats({&material.transmission, 1}, 0, 1, what + "transmission");
+        check_floats({&material.clearcoat, 1}, 0, 1, what + "clearcoat");
+        check_floats({&material.clearcoat_roughness, 1}, 0, 1, what + "clearcoat_roughness");
+        check_floats({&material.clearcoat_normal_scale, 1}, -coordinate_limit_mm, coordinate_limit_mm,
+                     what + "clearcoat_normal_scale");
         check_floats({&material.metallic, 1}, 0, 1, what + "metallic");
         check_floats({&material.roughness, 1}, 0, 1, what + "roughness");
         check_floats({&material.index, 1}, 1, 4, what + "index");
@@ -509,7 +534,9 @@ private:
         const auto morph_normals = view<glm::vec3>(geometry.morph_normals, "the buffer of morph_normals");
         const arhost_object *object = deformers_[i] == ARHOST_NONE ? nullptr : &objects_[deformers_[i]];
         const bool skinned = object && object->skin != ARHOST_NONE;
-        if (joints.size() != (skinned ? vertices : 0) || weights.size() != joints.size())
+        if ((skinned ? joints.empty() || joints.size() % std::max<std::uint64_t>(vertices, 1) != 0
+                     : !joints.empty()) ||
+            weights.size() != joints.size())
             fail("it has " + std::to_string(joints.size()) + " joints and " + std::to_string(weights.size()) +
                  " weights for " + std::to_string(vertices) + " vertices " + (skinned ? "with" : "without") +
                  " a skin");
@@ -532,11 +559,18 @@ private:
         for (std::size_t v = 0; v < joints.size(); ++v) {
             const glm::u16vec4 &j = joints[v];
             if (std::max({j.x, j.y, j.z, j.w}) >= joint_count)
-                fail("vertex " + std::to_string(v) + " refers to joint " +
+                fail("vertex " + std::to_string(v % vertices) + " refers to joint " +
                      std::to_string(std::max({j.x, j.y, j.z, j.w})) + ", but the skin has only " +
                      std::to_string(joint_count) + " joints");
-            const glm::vec4 &w = weights[v];
-            if (!(std::min({w.x, w.y, w.z, w.w}) >= 0 && within(w.x + w.y + w.z + w.w, 1 - tolerance, 1 + tolerance)))
+        }
+        for (std::size_t v = 0; v < vertices; ++v) {
+            float sum = 0, least = 0;
+            for (std::size_t set = v; set < weights.size(); set += vertices) {
+                const glm::vec4 &w = weights[set];
+                sum += w.x + w.y + w.z + w.w;
+                least = std::min({least, w.x, w.y, w.z, w.w});
+            }
+            if (!(least >= 0 && within(sum, 1 - tolerance, 1 + tolerance)))
                 fail("vertex " + std::to_string(v) +
                      " has invalid joint weights; they must not be negative, and their sum must be 1");
         }
@@ -561,8 +595,12 @@ private:
         if (!normals.empty() && normals.size() != positions.size())
             fail("it has " + std::to_string(normals.size()) + " normals for " + std::to_string(positions.size()) +
                  " vertices");
-        if (!texcoords.empty() && texcoords.size() != positions.size())
+        if (!texcoords.empty() && (positions.empty() || texcoords.size() % positions.size() != 0))
             fail("it has " + std::to_string(texcoords.size()) + " texcoords for " + std::to_string(positions.size()) +
+                 " vertices");
+        const auto colours = view<glm::u16vec4>(geometry.colours, "the buffer of colours");
+        if (!colours.empty() && colours.size() != positions.size())
+            fail("it has " + std::to_string(colours.size()) + " colours for " + std::to_string(positions.size()) +
                  " vertices");
         check_coordinates(floats_of(positions), 3, "vertex");
         check_coordinates(floats_of(texcoords), 2, "texcoord");
@@ -599,10 +637,11 @@ private:
 
     Box check_spheres(const arhost_geometry &geometry) {
         const auto spheres = view<glm::vec4>(geometry.positions, "the buffer of spheres");
-        for (const arhost_buffer &other : {geometry.normals, geometry.texcoords, geometry.indices, geometry.joints,
-                                           geometry.weights, geometry.morph_positions, geometry.morph_normals})
+        for (const arhost_buffer &other :
+             {geometry.normals, geometry.texcoords, geometry.colours, geometry.indices, geometry.joints,
+              geometry.weights, geometry.morph_positions, geometry.morph_normals})
             if (other.count != 0 || other.offset != 0 || other.stride != 0)
-                fail("spheres cannot have normals, texcoords, indices or deformation");
+                fail("spheres cannot have normals, texcoords, colours, indices or deformation");
         if (spheres.empty())
             fail("it has no spheres");
         check_coordinates(floats_of(spheres), 4, "sphere");
@@ -649,6 +688,7 @@ private:
     const arhost_scene *scene_ = nullptr;
     std::uint64_t unused_bytes_ = 0; // bytes not used by any buffer yet
     std::span<const arhost_geometry> geometries_;
+    std::span<const arhost_texel_image> images_;
     std::span<const arhost_texture> textures_;
     std::span<const arhost_material> materials_;
     std::span<const arhost_object> objects_;

@@ -212,7 +212,7 @@ EXPECTED_MARKER = _struct(80,
 
 # arhost/scene.h
 SCENE_MAGIC = 0x435354534f485241
-SCENE_VERSION = 4
+SCENE_VERSION = 5
 NONE = 0xffffffff
 BUFFER = _struct(16,
     ("offset", "u8", 0),
@@ -222,38 +222,47 @@ AXES_Z_UP = 1
 AXES_Y_UP = 2
 GEOMETRY_TRIANGLES = 1
 GEOMETRY_SPHERES = 2
-GEOMETRY = _struct(136,
+GEOMETRY = _struct(152,
     ("type", "i4", 0),
     ("reserved", "u4", 4),
     ("positions", BUFFER, 8),
     ("normals", BUFFER, 24),
     ("texcoords", BUFFER, 40),
-    ("indices", BUFFER, 56),
-    ("joints", BUFFER, 72),
-    ("weights", BUFFER, 88),
-    ("morph_positions", BUFFER, 104),
-    ("morph_normals", BUFFER, 120))
+    ("colours", BUFFER, 56),
+    ("indices", BUFFER, 72),
+    ("joints", BUFFER, 88),
+    ("weights", BUFFER, 104),
+    ("morph_positions", BUFFER, 120),
+    ("morph_normals", BUFFER, 136))
 TEXEL_SRGB8 = 1
 TEXEL_RGBA8 = 2
 TEXEL_RGBA32F = 3
-WRAP_REPEAT = 1
-WRAP_CLAMP = 2
-WRAP_MIRROR = 3
-TEXTURE = _struct(40,
+TEXEL_IMAGE = _struct(32,
     ("format", "i4", 0),
     ("width", "u4", 4),
     ("height", "u4", 8),
-    ("wrap_u", "i4", 12),
-    ("wrap_v", "i4", 16),
-    ("name", "u4", 20),
-    ("texels", BUFFER, 24))
+    ("name", "u4", 12),
+    ("texels", BUFFER, 16))
+WRAP_REPEAT = 1
+WRAP_CLAMP = 2
+WRAP_MIRROR = 3
+TEXEL_FILTER_LINEAR = 1
+TEXEL_FILTER_NEAREST = 2
+TEXTURE = _struct(44,
+    ("image", "u4", 0),
+    ("wrap_u", "i4", 4),
+    ("wrap_v", "i4", 8),
+    ("filter", "i4", 12),
+    ("texcoord_set", "u4", 16),
+    ("image_from_texcoord", ("f4", (6,)), 20))
 MATERIAL_DIFFUSE = 1
 MATERIAL_SPECULAR = 2
 MATERIAL_MIRROR = 3
 MATERIAL_METAL = 4
 MATERIAL_GLASS = 5
 MATERIAL_METALLIC_ROUGHNESS = 6
-MATERIAL = _struct(172,
+MATERIAL_UNLIT = 7
+MATERIAL = _struct(240,
     ("model", "i4", 0),
     ("colour_texture", "u4", 4),
     ("ambient", ("f4", (3,)), 8),
@@ -262,27 +271,44 @@ MATERIAL = _struct(172,
     ("exponent", "f4", 44),
     ("reflectivity", ("f4", (3,)), 48),
     ("emission", ("f4", (3,)), 60),
-    ("alpha_cutoff", "f4", 72),
-    ("metallic", "f4", 76),
-    ("roughness", "f4", 80),
-    ("metallic_roughness_texture", "u4", 84),
-    ("normal_texture", "u4", 88),
-    ("emission_texture", "u4", 92),
-    ("index", "f4", 96),
-    ("fresnel_exponent", "f4", 100),
-    ("fresnel_minimum", "f4", 104),
-    ("fresnel_maximum", "f4", 108),
-    ("refraction", ("f4", (3,)), 112),
-    ("extinction", ("f4", (3,)), 124),
-    ("shadow_attenuation", ("f4", (3,)), 136),
-    ("cutoff_colour", ("f4", (3,)), 148),
-    ("importance_cutoff", "f4", 160),
-    ("reflection_depth", "u4", 164),
-    ("refraction_depth", "u4", 168))
+    ("opacity", "f4", 72),
+    ("alpha_cutoff", "f4", 76),
+    ("blends", "u4", 80),
+    ("metallic", "f4", 84),
+    ("roughness", "f4", 88),
+    ("metallic_roughness_texture", "u4", 92),
+    ("normal_texture", "u4", 96),
+    ("emission_texture", "u4", 100),
+    ("normal_scale", "f4", 104),
+    ("occlusion_texture", "u4", 108),
+    ("occlusion_strength", "f4", 112),
+    ("specular_weight", "f4", 116),
+    ("specular_texture", "u4", 120),
+    ("specular_colour_texture", "u4", 124),
+    ("transmission", "f4", 128),
+    ("transmission_texture", "u4", 132),
+    ("thin_walled", "u4", 136),
+    ("clearcoat", "f4", 140),
+    ("clearcoat_roughness", "f4", 144),
+    ("clearcoat_texture", "u4", 148),
+    ("clearcoat_roughness_texture", "u4", 152),
+    ("clearcoat_normal_texture", "u4", 156),
+    ("clearcoat_normal_scale", "f4", 160),
+    ("index", "f4", 164),
+    ("fresnel_exponent", "f4", 168),
+    ("fresnel_minimum", "f4", 172),
+    ("fresnel_maximum", "f4", 176),
+    ("refraction", ("f4", (3,)), 180),
+    ("extinction", ("f4", (3,)), 192),
+    ("shadow_attenuation", ("f4", (3,)), 204),
+    ("cutoff_colour", ("f4", (3,)), 216),
+    ("importance_cutoff", "f4", 228),
+    ("reflection_depth", "u4", 232),
+    ("refraction_depth", "u4", 236))
 ROLE_VIRTUAL = 1
 ROLE_CATCHER = 2
 ROLE_OCCLUDER = 3
-OBJECT = _struct(80,
+OBJECT = _struct(88,
     ("geometry", "u4", 0),
     ("material", "u4", 4),
     ("role", "i4", 8),
@@ -291,7 +317,9 @@ OBJECT = _struct(80,
     ("moves", "u4", 64),
     ("deforms", "u4", 68),
     ("node", "u4", 72),
-    ("skin", "u4", 76))
+    ("skin", "u4", 76),
+    ("hides_back_faces", "u4", 80),
+    ("reserved", "u4", 84))
 NODE = _struct(112,
     ("parent", "u4", 0),
     ("animated", "u4", 4),
@@ -311,7 +339,7 @@ CHANNEL = _struct(48,
     ("node", "u4", 0),
     ("target", "i4", 4),
     ("interpolation", "i4", 8),
-    ("reserved", "u4", 12),
+    ("period_s", "f4", 12),
     ("times", BUFFER, 16),
     ("values", BUFFER, 32))
 SKIN = _struct(32,
@@ -347,7 +375,7 @@ ENVIRONMENT = _struct(80,
     ("columns", BUFFER, 64))
 INTEGRATOR_WHITTED = 1
 INTEGRATOR_PATH = 2
-SCENE = _struct(344,
+SCENE = _struct(360,
     ("magic", "u8", 0),
     ("version", "u4", 8),
     ("struct_size", "u4", 12),
@@ -366,15 +394,16 @@ SCENE = _struct(344,
     ("reserved", "u4", 100),
     ("environment", ENVIRONMENT, 104),
     ("geometries", BUFFER, 184),
-    ("textures", BUFFER, 200),
-    ("materials", BUFFER, 216),
-    ("objects", BUFFER, 232),
-    ("lights", BUFFER, 248),
-    ("nodes", BUFFER, 264),
-    ("channels", BUFFER, 280),
-    ("skins", BUFFER, 296),
-    ("names", BUFFER, 312),
-    ("anchors", BUFFER, 328))
+    ("images", BUFFER, 200),
+    ("textures", BUFFER, 216),
+    ("materials", BUFFER, 232),
+    ("objects", BUFFER, 248),
+    ("lights", BUFFER, 264),
+    ("nodes", BUFFER, 280),
+    ("channels", BUFFER, 296),
+    ("skins", BUFFER, 312),
+    ("names", BUFFER, 328),
+    ("anchors", BUFFER, 344))
 
 # arhost/motion.h
 MOVED_OBJECT = _struct(56,

@@ -26,6 +26,10 @@ struct Texture {
     std::int32_t width, height;
     arhost_texel_format format;
     arhost_wrap wrap_u, wrap_v;
+    bool is_nearest = false; // not filtered
+    // Set of texture coordinates, and (u, v) from them (arhost_texture).
+    std::uint32_t texcoord_set = 0;
+    float image_from_texcoord[6] = {1, 0, 0, 1, 0, 0};
 };
 
 // The video under the overlay, undistorted coordinates to pixels as in arhost/camera.h.

@@ -90,7 +90,7 @@ Sphere merged(const Sphere &a, const Sphere &b) {
 
 bool is_specular(const arhost_material &material) {
     return material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_METAL ||
-           material.model == ARHOST_MATERIAL_GLASS;
+           material.model == ARHOST_MATERIAL_GLASS || material.transmission > 0;
 }
 
 LightSources::LightSources(const arhost_scene &arena) : arena_(arena) {
@@ -98,7 +98,7 @@ LightSources::LightSources(const arhost_scene &arena) : arena_(arena) {
         environment_radiance_ = static_cast<float>(mean_of(arena.background));
         return;
     }
-    const arhost_texture &image = elements<arhost_texture>(arena, arena.textures)[arena.environment.texture];
+    const arhost_texel_image &image = environment_image(arena);
     const auto texels = elements<std::array<float, 4>>(arena, image.texels);
     double sum = 0, weights = 0, brightest = 0;
     for (std::uint32_t y = 0; y < image.height; ++y) {
@@ -193,8 +193,7 @@ void LightSources::add_emitter(std::uint32_t number, const PlacedObject &placed)
     const arhost_material &material = elements<arhost_material>(arena_, arena_.materials)[object.material];
     const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
     if (object.role != ARHOST_ROLE_VIRTUAL || !placed.is_visible || mean_of(material.emission) <= 0 ||
-        material.emission_texture != ARHOST_NONE ||
-        (material.alpha_cutoff > 0 && material.colour_texture != ARHOST_NONE) ||
+        material.emission_texture != ARHOST_NONE || material.alpha_cutoff > 0 || material.blends != 0 ||
         material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_GLASS)
         return;
     const auto add = [&](SourceType type, Vec3 position, double area) {
@@ -364,7 +363,7 @@ std::vector<float> environment_irradiance(const arhost_scene &arena) {
     const arhost_environment &environment = arena.environment;
     if (environment.texture == ARHOST_NONE)
         return {};
-    const arhost_texture &image = elements<arhost_texture>(arena, arena.textures)[environment.texture];
+    const arhost_texel_image &image = environment_image(arena);
     const auto texels = elements<std::array<float, 4>>(arena, image.texels);
     // Moments of the light from the cells of a coarse grid, for each channel: the sum of radiance times solid angle
     // times direction. They are exact for surfaces that see all of a cell.
@@ -402,7 +401,7 @@ std::vector<float> environment_irradiance(const arhost_scene &arena) {
 float brightest_texel(const arhost_scene &arena) {
     if (arena.environment.texture == ARHOST_NONE)
         return 0;
-    const arhost_texture &image = elements<arhost_texture>(arena, arena.textures)[arena.environment.texture];
+    const arhost_texel_image &image = environment_image(arena);
     float brightest = 0;
     for (const auto &texel : elements<std::array<float, 4>>(arena, image.texels))
         brightest = std::max(brightest, 0.2126f * texel[0] + 0.7152f * texel[1] + 0.0722f * texel[2]);

@@ -22,6 +22,15 @@ template <class T> std::span<const T> elements(const arhost_scene &arena, const 
     return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
 }
 
+// Returns the image of a texture.
+inline const arhost_texel_image &image_of(const arhost_scene &arena, const arhost_texture &texture) {
+    return elements<arhost_texel_image>(arena, arena.images)[texture.image];
+}
+// Returns the image of the environment, which the scene must have.
+inline const arhost_texel_image &environment_image(const arhost_scene &arena) {
+    return image_of(arena, elements<arhost_texture>(arena, arena.textures)[arena.environment.texture]);
+}
+
 float scene_extent(const arhost_scene &arena); // length of the diagonal of the scene's bounds, mm
 
 // Here and below, `world_from_object` is a 3×4 matrix, column-major.

@@ -29,6 +29,13 @@ struct Query {
     bool cull_catcher_back_faces;
 };
 
+// Bits of RTCRay::flags.
+enum RayFlag : unsigned {
+    ray_of_eye = 1 // from the eye, scattered only by mirrors and glass
+};
+// The eye does not see points of a lower opacity.
+inline constexpr float least_opacity = 1.0f / 512;
+
 enum class Coherence { coherent, incoherent };
 
 RT_EMBREE_INLINE Query make_query(Coherence coherence, bool cull_catcher_back_faces = false) {

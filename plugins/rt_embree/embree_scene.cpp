@@ -18,6 +18,7 @@ namespace {
 using arhost::Failure;
 using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
+using arhost::raytracer_common::image_of;
 using arhost::raytracer_common::is_identity;
 using arhost::raytracer_common::object_extent;
 using arhost::raytracer_common::quantized_alpha;
@@ -40,6 +41,7 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
     object.material = &elements<arhost_material>(arena, arena.materials)[from.material];
     object.role = from.role;
     object.has_transform = !is_identity(from.world_from_object);
+    object.blends = object.material->blends != 0 && arena.integrator == ARHOST_INTEGRATOR_PATH;
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
     if (geometry.type == ARHOST_GEOMETRY_TRIANGLES) {
         const auto floats = [&](const arhost_buffer &buffer) {
@@ -53,6 +55,10 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
         object.texcoord_stride = geometry.texcoords.stride;
         object.indices = reinterpret_cast<const int *>(bytes(arena) + geometry.indices.offset);
         object.index_stride = geometry.indices.stride;
+        if (geometry.colours.count)
+            object.colours = reinterpret_cast<const int *>(bytes(arena) + geometry.colours.offset);
+        object.colour_stride = geometry.colours.stride;
+        object.vertex_count = geometry.positions.count;
     }
     return object;
 }
@@ -158,10 +164,14 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         static_ = new_scene(RTC_SCENE_FLAG_NONE);
     if (needs_catcher_bvh(arena))
         catchers_ = new_scene(RTC_SCENE_FLAG_NONE);
-    for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures))
-        textures_.push_back({bytes(arena) + texture.texels.offset, static_cast<std::int32_t>(texture.width),
-                             static_cast<std::int32_t>(texture.height), texture.format, texture.wrap_u,
-                             texture.wrap_v});
+    for (const arhost_texture &texture : elements<arhost_texture>(arena, arena.textures)) {
+        const arhost_texel_image &image = image_of(arena, texture);
+        Texture &to = textures_.emplace_back(
+            Texture{bytes(arena) + image.texels.offset, static_cast<std::int32_t>(image.width),
+                    static_cast<std::int32_t>(image.height), image.format, texture.wrap_u, texture.wrap_v,
+                    texture.filter == ARHOST_TEXEL_FILTER_NEAREST, texture.texcoord_set});
+        std::ranges::copy(texture.image_from_texcoord, to.image_from_texcoord);
+    }
     view_.textures = textures_.data();
     for (std::uint32_t number = 0; number < from.size(); ++number) {
         const arhost_object &object = from[number];
@@ -215,6 +225,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     view_.max_depth = arena.max_depth;
     copy3(arena.ambient, view_.ambient);
     copy3(arena.background, view_.background);
+    view_.has_ambient = std::ranges::any_of(arena.ambient, [](float c) { return c > 0; });
     view_.has_background = arena.environment.texture == ARHOST_NONE &&
                            std::any_of(arena.background, arena.background + 3, [](float c) { return c > 0; });
     view_.shadow_alpha_opaque = quantized_alpha(arena.shadow_alpha_opaque);
@@ -376,14 +387,16 @@ GeometryHandle EmbreeScene::new_geometry(std::uint32_t number) {
     set_buffer(RTC_BUFFER_TYPE_VERTEX, spheres ? RTC_FORMAT_FLOAT4 : RTC_FORMAT_FLOAT3, from.positions);
     if (!spheres)
         set_buffer(RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, from.indices);
-    if (const HitFilter filter = hit_filter_of(objects_[number], textures_.data()); filter.is_needed())
+    if (const HitFilter filter = hit_filter_of(objects_[number], object.hides_back_faces != 0, textures_.data());
+        filter.is_needed())
         set_hit_filter(geometry.get(), *hit_filters_.emplace_back(std::make_unique<HitFilter>(filter)));
     return geometry;
 }
 
 RTCScene EmbreeScene::instanced_scene(std::uint32_t number) {
-    const std::uint32_t shape = elements<arhost_object>(arena_, arena_.objects)[number].geometry;
-    const HitFilter filter = hit_filter_of(objects_[number], textures_.data());
+    const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[number];
+    const std::uint32_t shape = object.geometry;
+    const HitFilter filter = hit_filter_of(objects_[number], object.hides_back_faces != 0, textures_.data());
     for (const Instanced &known : instanced_)
         if (known.geometry == shape && known.filter == filter)
             return known.scene.get();

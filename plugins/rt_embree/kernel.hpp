@@ -43,11 +43,14 @@ struct Object {
     const int *indices;     // three vertex indices per triangle
     const float *positions; // vertex positions
     const float *normals;   // NULL if flat-shaded or a sphere
-    const float *texcoords; // NULL if absent
+    const float *texcoords; // NULL if absent; sets follow each other
+    const int *colours;     // NULL if absent: two ints per vertex, red and green, blue and opacity, 16 bits each
+    bool blends;            // with the path integrator
     // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on
     // a ball; 0 if the object is not sampled as a light source. Radius of the ball in world space, mm; 0: a mesh.
     float emitter_density, ball_radius;
-    std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride;
+    std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride, colour_stride;
+    std::uint32_t vertex_count;
 };
 
 struct Environment {
@@ -105,6 +108,7 @@ struct Scene {
     bool has_gloss;        // whether a catcher may mirror virtual objects
     bool has_several_real; // several catchers or occluders
     bool has_area_lights;
+    bool has_ambient;    // `ambient` is not black
     bool has_background; // a background that is not black, and no environment
     int sum_row_count() const { return has_gloss ? sum_rows : has_catchers ? hidden_row + 3 : caught_row; }
     const float *linear_of_srgb8; // linear value of each of the 256 sRGB codes

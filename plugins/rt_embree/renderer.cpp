@@ -85,23 +85,25 @@ Kernel kernel_of(InstructionSet instructions) {
     }
 }
 
-// Whether there are virtual mirrors or glass objects.
+// Whether there are virtual mirrors, glass or translucent objects.
 bool has_specular(const EmbreeScene &scene) {
     return std::ranges::any_of(std::span(scene.view().objects, scene.placed_objects().size()),
                                [](const Object &object) {
                                    const arhost_material_model model = object.material->model;
                                    return object.role == ARHOST_ROLE_VIRTUAL &&
-                                          (model == ARHOST_MATERIAL_MIRROR || model == ARHOST_MATERIAL_GLASS);
+                                          (model == ARHOST_MATERIAL_MIRROR || model == ARHOST_MATERIAL_GLASS ||
+                                           object.material->transmission > 0 || object.blends);
                                });
 }
 
 } // namespace
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
-    // The first queue holds up to two rays per pixel, because glass reflects and refracts, and glossy catchers
-    // scatter two. All other queues hold fewer than three packets (trace_queued_rays() in scatter.inl). Whole packets
-    // are read even from partly filled queues, so each row needs space for one more packet.
-    constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
+    // The first queue holds up to three rays per pixel: one that passes a translucent surface, and two that glass
+    // reflects and refracts or that glossy catchers scatter. All other queues hold fewer than three packets
+    // (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled queues, so each row needs
+    // space for one more packet.
+    constexpr std::int32_t packet = 16, first_capacity = 3 * tile_pixels + packet, capacity = 4 * packet;
     constexpr int pixel_rows = plane_count * 3 + sum_rows + 3 + guide_rows;
     constexpr std::int32_t caught_capacity = tile_pixels / 4 + packet, deferred_capacity = tile_pixels + packet;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +

@@ -122,8 +122,8 @@ AccelerationStructures::AccelerationStructures(const Device &device, const Submi
         instance.mask = objects[i].mask;
         // Selects the hit group in the shader binding table: 0 for triangles, 1 for spheres.
         instance.instanceShaderBindingTableRecordOffset = objects[i].flags & is_spheres ? 1 : 0;
-        instance.flags = objects[i].flags & has_holes ? VK_GEOMETRY_INSTANCE_FORCE_NO_OPAQUE_BIT_KHR
-                                                      : VK_GEOMETRY_INSTANCE_FORCE_OPAQUE_BIT_KHR;
+        instance.flags = objects[i].flags & rejects_hits ? VK_GEOMETRY_INSTANCE_FORCE_NO_OPAQUE_BIT_KHR
+                                                         : VK_GEOMETRY_INSTANCE_FORCE_OPAQUE_BIT_KHR;
         const auto structure = bottom_level_.find(
             from[i].geometry); // absent if the mesh is empty; rays ignore instances with reference 0
         instance.accelerationStructureReference = structure == bottom_level_.end() ? 0 : address(structure->second);

@@ -15,7 +15,14 @@
 namespace rt_vulkan {
 
 enum RoleMask : std::uint32_t { opaque_mask = 1, glass_mask = 2, catcher_mask = 4, occluder_mask = 8 };
-enum ObjectFlag : std::uint32_t { has_transform = 1, is_spheres = 2, has_holes = 4 };
+enum ObjectFlag : std::uint32_t {
+    has_transform = 1,
+    is_spheres = 2,
+    has_holes = 4,        // an alpha cutoff
+    hides_back_faces = 8, // from the eye
+    blends = 16,
+    rejects_hits = has_holes | hides_back_faces | blends
+};
 
 struct Object {
     float object_from_world[4][4]; // columns
@@ -24,6 +31,7 @@ struct Object {
     std::uint32_t root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
     std::uint32_t first_index, first_normal, first_texcoord;
     float extent[3], emitter_density;
+    std::uint32_t first_colour, vertex_count, unused[2]; // first_colour: in the buffer of indices
 };
 
 struct Material {
@@ -47,7 +55,11 @@ struct Material {
     float importance_cutoff;
     float fresnel_minimum, fresnel_maximum;
     std::uint32_t reflection_depth, refraction_depth;
-    std::uint32_t metallic_roughness_texture, normal_texture, emission_texture, unused;
+    std::uint32_t metallic_roughness_texture, normal_texture, emission_texture, occlusion_texture;
+    float opacity, normal_scale, occlusion_strength, specular_weight;
+    std::uint32_t specular_texture, specular_colour_texture, transmission_texture, thin_walled;
+    float transmission, clearcoat, clearcoat_roughness, clearcoat_normal_scale;
+    std::uint32_t clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture, unused;
 };
 
 struct Light {
@@ -65,7 +77,9 @@ struct Light {
 
 struct Texture {
     std::uint32_t format, first_texel, wrap_u, wrap_v; // first_texel: in 32-bit words
-    std::int32_t width, height, unused[2];
+    std::int32_t width, height;
+    std::uint32_t is_nearest, texcoord_set;
+    float image_from_texcoord[6], unused[2];
 };
 
 struct Node {
@@ -137,7 +151,7 @@ struct Frame {
     std::uint32_t photon_count, first_photon, shown_parts, unused;
 };
 
-static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
+static_assert(sizeof(Object) == 224 && sizeof(Material) == 240 && sizeof(Light) == 80 && sizeof(Texture) == 64 &&
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 64 &&
               sizeof(Frame) == 1008 + 16 * max_samples);
 
@@ -167,7 +181,8 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss, has_photons, may_denoise;
+    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss, has_photons, may_denoise,
+        has_coat;
 };
 
 } // namespace rt_vulkan

@@ -409,10 +409,12 @@ void Renderer::write_descriptor_set() {
 
 void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     // If glass spawns two rays, up to one ray per depth waits on the stack. With the path integrator, glossy catchers
-    // spawn two rays at the first hit only, and so does glass, unless images are denoised.
+    // spawn two rays at the first hit only, and so does glass, unless images are denoised. Translucent surfaces spawn
+    // one more.
     const bool mirrors = is_path_ && scene_.has_gloss();
     const bool branches = mirrors || (scene_.has_glass() && (is_path_ || !settings_.single_path));
-    const Specialization constants{!branches ? 1
+    const Specialization constants{scene_.blends() ? 2 * static_cast<std::int32_t>(max_depth) + 3
+                                   : !branches     ? 1
                                    : is_path_ && !(denoiser_ && scene_.has_glass())
                                        ? 2
                                        : std::max(2, static_cast<std::int32_t>(max_depth) + 1),
@@ -425,7 +427,8 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    scene_.video_size() > 0,
                                    mirrors,
                                    settings_.photons > 0,
-                                   denoiser_.has_value()};
+                                   denoiser_.has_value(),
+                                   scene_.has_coat()};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
     if (settings_.photons > 0)

@@ -3,6 +3,7 @@
 
 #include "raytracer_common/scene_geometry.hpp"
 
+#include <arhost/shading/scalar.hpp>
 #include <arhost/shading/srgb8.hpp>
 
 #include <algorithm>
@@ -18,6 +19,7 @@ namespace {
 using arhost::Failure;
 using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
+using arhost::raytracer_common::image_of;
 using arhost::raytracer_common::is_identity;
 using arhost::raytracer_common::is_specular;
 using arhost::raytracer_common::LightSources;
@@ -36,7 +38,7 @@ template <std::size_t count> void copy(const float (&from)[count], float (&to)[c
     std::copy_n(from, count, to);
 }
 
-Material material_of(const arhost_material &from) {
+Material material_of(const arhost_material &from, bool is_path) {
     Material to{};
     to.model = static_cast<std::uint32_t>(from.model);
     copy(from.ambient, to.ambient);
@@ -50,7 +52,7 @@ Material material_of(const arhost_material &from) {
     copy(from.cutoff_colour, to.cutoff_colour);
     to.colour_texture = from.colour_texture;
     to.exponent = from.exponent;
-    to.alpha_cutoff = from.alpha_cutoff;
+    to.alpha_cutoff = from.blends && !is_path ? 0.5f : from.alpha_cutoff; // the Whitted integrator does not blend
     to.metallic = from.metallic;
     to.roughness = from.roughness;
     to.index = from.index;
@@ -63,6 +65,25 @@ Material material_of(const arhost_material &from) {
     to.metallic_roughness_texture = from.metallic_roughness_texture;
     to.normal_texture = from.normal_texture;
     to.emission_texture = from.emission_texture;
+    to.occlusion_texture = from.occlusion_texture;
+    to.opacity = from.opacity;
+    to.normal_scale = from.normal_scale;
+    to.occlusion_strength = from.occlusion_strength;
+    to.specular_weight = from.specular_weight;
+    to.specular_texture = from.specular_texture;
+    to.specular_colour_texture = from.specular_colour_texture;
+    to.transmission_texture = from.transmission_texture;
+    to.thin_walled = from.thin_walled;
+    to.transmission = from.transmission;
+    to.clearcoat = from.clearcoat;
+    to.clearcoat_roughness = from.clearcoat_roughness;
+    to.clearcoat_normal_scale = from.clearcoat_normal_scale;
+    to.clearcoat_texture = from.clearcoat_texture;
+    to.clearcoat_roughness_texture = from.clearcoat_roughness_texture;
+    to.clearcoat_normal_texture = from.clearcoat_normal_texture;
+    if (from.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS) // the reflectance of non-metals at normal incidence
+        for (float &channel : to.specular)
+            channel *= arhost::shading::normal_reflectance(from.index);
     return to;
 }
 
@@ -115,7 +136,7 @@ SceneData::SceneData(const arhost_raytracer_setup &setup, bool has_bvhs, const a
     : arena_(*setup.scene), has_bvhs_(has_bvhs), host_(host) {
     const arhost_scene &arena = arena_;
     for (const arhost_material &material : elements<arhost_material>(arena, arena.materials))
-        materials_.push_back(material_of(material));
+        materials_.push_back(material_of(material, arena.integrator == ARHOST_INTEGRATOR_PATH));
     for (const arhost_light &light : elements<arhost_light>(arena, arena.lights)) {
         lights_.push_back(light_of(light));
         has_area_lights_ |= light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE ||
@@ -139,14 +160,17 @@ SceneData::SceneData(const arhost_raytracer_setup &setup, bool has_bvhs, const a
     moving_nodes_ = nodes_.size();
     moving_primitives_ = primitives_.size();
     moving_attributes_ = attributes_.size();
-    for (auto &[geometry, mesh] : meshes_)
+    for (auto &[geometry, mesh] : meshes_) {
         add_texcoords(mesh, geometries[geometry]);
+        add_colours(mesh, geometries[geometry]);
+    }
     for (const arhost_object &object : objects) {
         if (!meshes_.contains(object.geometry)) {
             check_cancelled();
             Mesh &mesh = mesh_of(object.geometry, false);
             add_normals(mesh, geometries[object.geometry]);
             add_texcoords(mesh, geometries[object.geometry]);
+            add_colours(mesh, geometries[object.geometry]);
         }
         add_object(object, meshes_.at(object.geometry));
     }
@@ -202,7 +226,7 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     mesh.first_primitive = static_cast<std::uint32_t>(primitives_.size());
     mesh.root = has_bvhs_ ? static_cast<std::uint32_t>(nodes_.size()) : mesh.first_primitive;
     mesh.first_index = static_cast<std::uint32_t>(indices_.size());
-    mesh.first_normal = mesh.first_texcoord = ARHOST_NONE;
+    mesh.first_normal = mesh.first_texcoord = mesh.first_colour = ARHOST_NONE;
     mesh.local = empty_box();
     mesh.is_empty = boxes.empty();
     if (boxes.empty())
@@ -250,6 +274,18 @@ void SceneData::add_texcoords(Mesh &mesh, const arhost_geometry &geometry) {
         std::memcpy(texcoord, bytes(arena_) + geometry.texcoords.offset + std::size_t{geometry.texcoords.stride} * i,
                     sizeof texcoord);
         attributes_.insert(attributes_.end(), texcoord, texcoord + 2);
+    }
+}
+
+void SceneData::add_colours(Mesh &mesh, const arhost_geometry &geometry) {
+    if (geometry.colours.count == 0)
+        return;
+    mesh.first_colour = static_cast<std::uint32_t>(indices_.size());
+    for (std::uint32_t i = 0; i < geometry.colours.count; ++i) {
+        std::uint32_t words[2];
+        std::memcpy(words, bytes(arena_) + geometry.colours.offset + std::size_t{geometry.colours.stride} * i,
+                    sizeof words);
+        indices_.insert(indices_.end(), words, words + 2);
     }
 }
 
@@ -313,21 +349,32 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     object.first_index = mesh.first_index;
     object.first_normal = mesh.first_normal;
     object.first_texcoord = mesh.first_texcoord;
+    object.first_colour = mesh.first_colour;
+    object.vertex_count = geometry.positions.count;
     if (geometry.type == ARHOST_GEOMETRY_SPHERES)
         object.flags |= is_spheres;
-    if (!is_glass && material.model != ARHOST_MATERIAL_MIRROR && material.alpha_cutoff > 0 &&
-        material.colour_texture != ARHOST_NONE && mesh.first_texcoord != ARHOST_NONE)
-        object.flags |= rt_vulkan::has_holes;
+    const bool is_path = arena_.integrator == ARHOST_INTEGRATOR_PATH,
+               is_mesh = geometry.type == ARHOST_GEOMETRY_TRIANGLES;
+    if (is_mesh && !is_glass && material.model != ARHOST_MATERIAL_MIRROR) {
+        if (materials_[from.material].alpha_cutoff > 0)
+            object.flags |= rt_vulkan::has_holes;
+        if (material.blends && is_path)
+            object.flags |= rt_vulkan::blends;
+    }
+    if (is_mesh && from.hides_back_faces)
+        object.flags |= hides_back_faces;
     if (from.moves || !is_identity(from.world_from_object))
         object.flags |= has_transform;
     set_transform(object, mesh, from.world_from_object);
-    has_glass_ |= is_glass;
-    has_specular_ |= from.role == ARHOST_ROLE_VIRTUAL && is_specular(material);
+    has_glass_ |= is_glass || (is_path && material.transmission > 0);
+    has_coat_ |= is_path && material.clearcoat > 0;
+    blends_ |= (object.flags & rt_vulkan::blends) != 0;
+    has_specular_ |= from.role == ARHOST_ROLE_VIRTUAL && (is_specular(material) || material.blends);
     has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
     has_gloss_ |= from.role == ARHOST_ROLE_CATCHER && material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS;
     has_several_real_ |= from.role != ARHOST_ROLE_VIRTUAL && has_real_;
     has_real_ |= from.role != ARHOST_ROLE_VIRTUAL;
-    has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;
+    has_holes_ |= (object.flags & rejects_hits) != 0;
     objects_.push_back(object);
     solid_objects_ += !mesh.is_empty;
     std::copy_n(from.world_from_object, 12, transforms_.emplace_back().begin());
@@ -434,19 +481,27 @@ void SceneData::refit_bvh(Mesh &mesh, std::span<const Box> boxes) {
 }
 
 void SceneData::add_textures() {
+    std::vector<std::uint32_t> first_texels; // of the images, in 32-bit words
     std::size_t words = 0;
+    for (const arhost_texel_image &image : elements<arhost_texel_image>(arena_, arena_.images)) {
+        first_texels.push_back(static_cast<std::uint32_t>(words));
+        const std::size_t size = std::size_t{image.texels.stride} * image.texels.count;
+        texels_.emplace_back(bytes(arena_) + image.texels.offset, size);
+        words += size / 4;
+    }
     for (const arhost_texture &from : elements<arhost_texture>(arena_, arena_.textures)) {
+        const arhost_texel_image &image = image_of(arena_, from);
         Texture to{};
-        to.format = static_cast<std::uint32_t>(from.format);
-        to.first_texel = static_cast<std::uint32_t>(words);
+        to.format = static_cast<std::uint32_t>(image.format);
+        to.first_texel = first_texels[from.image];
         to.wrap_u = static_cast<std::uint32_t>(from.wrap_u);
         to.wrap_v = static_cast<std::uint32_t>(from.wrap_v);
-        to.width = static_cast<std::int32_t>(from.width);
-        to.height = static_cast<std::int32_t>(from.height);
+        to.width = static_cast<std::int32_t>(image.width);
+        to.height = static_cast<std::int32_t>(image.height);
+        to.is_nearest = from.filter == ARHOST_TEXEL_FILTER_NEAREST;
+        to.texcoord_set = from.texcoord_set;
+        copy(from.image_from_texcoord, to.image_from_texcoord);
         textures_.push_back(to);
-        const std::size_t size = std::size_t{from.texels.stride} * from.texels.count;
-        texels_.emplace_back(bytes(arena_) + from.texels.offset, size);
-        words += size / 4;
     }
 }
 
@@ -456,13 +511,14 @@ void SceneData::add_path_textures(const arhost_raytracer_setup &setup) {
     for (const Bytes &texels : texels_)
         size += texels.size();
     const auto add = [&](arhost_texel_format format, arhost_wrap wrap_u, std::uint32_t width, std::uint32_t height) {
-        textures_.push_back({static_cast<std::uint32_t>(format),
-                             static_cast<std::uint32_t>(size / 4),
-                             static_cast<std::uint32_t>(wrap_u),
-                             ARHOST_WRAP_CLAMP,
-                             static_cast<std::int32_t>(width),
-                             static_cast<std::int32_t>(height),
-                             {}});
+        Texture to{};
+        to.format = static_cast<std::uint32_t>(format);
+        to.first_texel = static_cast<std::uint32_t>(size / 4);
+        to.wrap_u = static_cast<std::uint32_t>(wrap_u);
+        to.wrap_v = ARHOST_WRAP_CLAMP;
+        to.width = static_cast<std::int32_t>(width);
+        to.height = static_cast<std::int32_t>(height);
+        textures_.push_back(to);
         return static_cast<std::uint32_t>(textures_.size() - 1);
     };
     using namespace arhost::raytracer_common;

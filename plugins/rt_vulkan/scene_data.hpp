@@ -64,19 +64,20 @@ public:
     const arhost_environment &environment() const { return arena_.environment; }
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
-    bool has_holes() const { return has_holes_; }
+    bool has_holes() const { return has_holes_; } // whether any object rejects hits (ObjectFlag)
+    bool has_coat() const { return has_coat_; }
+    bool blends() const { return blends_; }       // whether any object is translucent
     bool has_gloss() const { return has_gloss_; } // whether a catcher may mirror
     bool has_area_lights() const { return has_area_lights_; }
-    bool has_specular() const {
-        return has_specular_;
-    } // virtual objects that reflect or refract like mirrors or glass
+    // Virtual objects that reflect or refract like mirrors or glass, or are translucent.
+    bool has_specular() const { return has_specular_; }
     bool may_have_photons() const { return has_specular_ && arena_.lights.count > 0; } // path integrator only
     bool has_textures() const { return arena_.textures.count > 0; }                    // including the environment
 
 private:
     // The offsets of a geometry's data in the arrays below.
     struct Mesh {
-        std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord;
+        std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord, first_colour;
         Box local;
         bool is_empty;
         // The following members are set for deforming meshes only.
@@ -87,6 +88,7 @@ private:
     Mesh &mesh_of(std::uint32_t geometry, bool deforms);
     void add_normals(Mesh &mesh, const arhost_geometry &geometry);
     void add_texcoords(Mesh &mesh, const arhost_geometry &geometry);
+    void add_colours(Mesh &mesh, const arhost_geometry &geometry);
     void write_bvh(const Mesh &mesh, const arhost_geometry &geometry, Points points);
     std::uint32_t mask_of(const arhost_object &object) const;
     void add_object(const arhost_object &object, const Mesh &mesh);
@@ -131,7 +133,8 @@ private:
     std::size_t moving_nodes_ = 0, moving_primitives_ = 0, moving_attributes_ = 0;
     std::uint32_t solid_objects_ = 0, environment_rows_ = 0, environment_columns_ = 0;
     bool anything_moves_ = false, has_glass_ = false, has_catchers_ = false, has_holes_ = false, has_gloss_ = false,
-         has_area_lights_ = false, has_real_ = false, has_several_real_ = false, has_specular_ = false;
+         has_area_lights_ = false, has_real_ = false, has_several_real_ = false, has_specular_ = false,
+         has_coat_ = false, blends_ = false;
     std::uint64_t rebuilds_ = 0;
 };
 

@@ -5,7 +5,7 @@
 #include "input.hpp"
 #include "targets.hpp"
 
-#include "scene/gltf.hpp"
+#include "scene/gltf/gltf.hpp"
 #include "scene/mesh_loader.hpp"
 #include "scene/motion.hpp"
 #include "scene/scene_loader.hpp"
@@ -65,12 +65,12 @@ void run_gltf(Bytes bytes) {
         Textures textures(builder, callbacks);
         GltfPlacement placement;
         placement.name = "gltf";
-        placement.animation = "0";
+        placement.animations = {"all"};
         const auto file = write_scratch(binary ? "model.glb" : "model.gltf", bytes);
         try {
             builder.settings.duration_s = add_gltf(builder, textures, file, placement, callbacks);
         } catch (const AnimationError &) {
-            placement.animation.reset();
+            placement.animations.clear();
             builder = ArenaBuilder();
             add_gltf(builder, textures, file, placement, callbacks);
         }

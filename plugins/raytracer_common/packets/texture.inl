@@ -42,7 +42,7 @@ ARHOST_INLINE Texel texel_at(const float *linear_of_srgb8, const Texture &textur
     return {Vec3{to_float(byte(0)), to_float(byte(1)), to_float(byte(2))} * Float(1.0f / 255), alpha};
 }
 
-// Samples a texture with bilinear filtering. `linear_of_srgb8`: linear value of each of the 256 sRGB codes.
+// Samples a texture with its filter. `linear_of_srgb8`: linear value of each of the 256 sRGB codes.
 ARHOST_INLINE Texel sample_texture(const float *linear_of_srgb8, const Texture &texture, Float u, Float v) {
     // Reduces a coordinate to an equivalent one near 0: the texel index must fit an int, and the float must retain
     // its fraction.
@@ -52,12 +52,15 @@ ARHOST_INLINE Texel sample_texture(const float *linear_of_srgb8, const Texture &
         const Float bounded = min(max(t, Float(-1e6f)), Float(1e6f));
         return bounded - Float(2.0f) * floor(bounded * Float(0.5f));
     };
-    const Float x = reduced(u, texture.wrap_u) * Float(static_cast<float>(texture.width)) - Float(0.5f);
-    const Float y = reduced(v, texture.wrap_v) * Float(static_cast<float>(texture.height)) - Float(0.5f);
+    const float half = texture.is_nearest ? 0.0f : 0.5f;
+    const Float x = reduced(u, texture.wrap_u) * Float(static_cast<float>(texture.width)) - Float(half);
+    const Float y = reduced(v, texture.wrap_v) * Float(static_cast<float>(texture.height)) - Float(half);
     const Float left = floor(x), top = floor(y), tx = x - left, ty = y - top;
     const Int x0 = wrapped(to_int(left), texture.width, texture.wrap_u);
-    const Int x1 = wrapped(to_int(left) + Int(1), texture.width, texture.wrap_u);
     const Int y0 = wrapped(to_int(top), texture.height, texture.wrap_v);
+    if (texture.is_nearest)
+        return texel_at(linear_of_srgb8, texture, x0, y0);
+    const Int x1 = wrapped(to_int(left) + Int(1), texture.width, texture.wrap_u);
     const Int y1 = wrapped(to_int(top) + Int(1), texture.height, texture.wrap_v);
     const auto mix = [](Texel a, Texel b, Float t) __attribute__((always_inline)) {
         return Texel{a.colour + (b.colour - a.colour) * t, a.alpha + (b.alpha - a.alpha) * t};

@@ -4,7 +4,29 @@
 #pragma once
 #include "path_catcher.inl"
 
-// Returns the numbers of the surfaces hit (surface_number()).
+// Returns the lanes in which the eye sees through the surfaces of an object, clearly.
+ARHOST_INLINE Bool is_seen_through(const Scene &scene, const Object &object, const RTCHit16 &hit, Bool here) {
+    const arhost_material &material = *object.material;
+    Bool through = bool_of(false);
+    if (object.blends) {
+        Float opacity = Float(material.opacity) * vertex_colour(object, hit, here).alpha;
+        if (material.colour_texture != ARHOST_NONE)
+            opacity = opacity * sample_object_texture(scene, object, material.colour_texture, hit, here).alpha;
+        through = opacity < Float(1.0f);
+    }
+    constexpr float clear = 0.05f; // roughness
+    if (material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS && material.transmission > 0 &&
+        material.roughness <= clear) {
+        Float transmission = Float(material.transmission);
+        if (material.transmission_texture != ARHOST_NONE)
+            transmission = transmission *
+                           sample_object_texture(scene, object, material.transmission_texture, hit, here).colour.x;
+        through = through | (transmission > Float(0.5f));
+    }
+    return here & through;
+}
+
+// Returns the numbers of the surfaces hit (surface_number()). Points that are seen through are specular.
 ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool active) {
     Int kinds(0);
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
@@ -18,6 +40,8 @@ ARHOST_INLINE Int surface_of(const Scene &scene, const RTCHit16 &hit, Bool activ
         else if (model == ARHOST_MATERIAL_MIRROR || model == ARHOST_MATERIAL_GLASS)
             kind = specular_surface;
         kinds = select(here, Int(kind), kinds);
+        if (object.role == ARHOST_ROLE_VIRTUAL)
+            kinds = select(is_seen_through(scene, object, hit, here), Int(specular_surface), kinds);
     });
     return surface_number(object_number(scene, hit), kinds) & Int(mirrored_unit - 1);
 }
@@ -44,7 +68,9 @@ ARHOST_INLINE Vec3 divisor_of(const Surface &s) {
     const auto of = [&](Float a, Float b) __attribute__((always_inline)) {
         return select(divides, max(a + b, Float(least_divisor)), Float(1.0f));
     };
-    return {of(s.diffuse.x, gloss.x), of(s.diffuse.y, gloss.y), of(s.diffuse.z, gloss.z)};
+    const Vec3 unlit{max(s.emission.x, Float(least_divisor)), max(s.emission.y, Float(least_divisor)),
+                     max(s.emission.z, Float(least_divisor))};
+    return select(s.is_unlit, unlit, {of(s.diffuse.x, gloss.x), of(s.diffuse.y, gloss.y), of(s.diffuse.z, gloss.z)});
 }
 
 // Traces rays through mirrors and glass, at each vertex along the branch with the larger throughput, to the first
@@ -61,6 +87,11 @@ ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction
         travelled = travelled + s.distance;
         Bool arrived = specular;
         Vec3 origin = s.position, next = towards;
+        if (s.any_translucent) {
+            const Bool passes = specular & (s.opacity < Float(0.5f));
+            origin = select(passes, s.position - s.geometric_normal * s.offset, origin);
+            arrived = arrived & ~passes;
+        }
         for_each_object(scene, rays.hit, specular, [&](const Object &object, Bool here) {
             const arhost_material &material = *object.material;
             const Vec3 above = s.position + s.geometric_normal * s.offset;
@@ -68,12 +99,17 @@ ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction
                 origin = select(here, above, origin);
                 next = select(here, reflected(s, towards), next);
                 arrived = arrived & ~here;
-            } else if (material.model == ARHOST_MATERIAL_GLASS && material.roughness == 0) {
-                const GlassScatter glass = scatter_at_glass(s, towards, material, {Float(0.0f), Float(0.0f)}, here);
-                const Bool reflects = here & (glass.reflectance > Float(0.5f));
-                origin = select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), origin);
-                next = select(here, select(reflects, glass.reflected, glass.refracted), next);
-                arrived = arrived & ~here;
+            } else if ((material.model == ARHOST_MATERIAL_GLASS && material.roughness == 0) ||
+                       material.transmission > 0) {
+                const Bool passes =
+                    here & ((s.transmission > Float(0.5f)) | bool_of(material.model == ARHOST_MATERIAL_GLASS));
+                Glass glass = glass_of(material, s);
+                glass.is_rough = false;
+                const GlassScatter scatter = scatter_at_glass(s, towards, glass, {Float(0.0f), Float(0.0f)}, passes);
+                const Bool reflects = passes & (scatter.reflectance > Float(0.5f));
+                origin = select(passes, select(reflects, above, s.position - s.geometric_normal * s.offset), origin);
+                next = select(passes, select(reflects, scatter.reflected, scatter.refracted), next);
+                arrived = arrived & ~passes;
             }
         });
         if (any(arrived)) {
@@ -86,7 +122,7 @@ ARHOST_INLINE void store_seen(const Work &work, RTCRayHit16 rays, Vec3 direction
         }
         specular = specular & ~arrived;
         towards = normalize(next);
-        set_ray(rays.ray, origin, towards, Float(far_away), Int(all_masks));
+        set_ray(rays.ray, origin, towards, Float(far_away), Int(all_masks), Int(ray_of_eye));
         specular = trace(scene, scene.root, make_query(Coherence::incoherent), rays, specular);
     }
 }

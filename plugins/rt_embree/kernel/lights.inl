@@ -339,7 +339,7 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
                                            s.specular * phong(s.normal, sample.direction, to_eye, s.exponent));
         if (s.any_rough) {
             const Vec3 half_vector = normalize(sample.direction + to_eye);
-            const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
+            const Vec3 fresnel = fresnel_of(s, dot(to_eye, half_vector));
             const Vec3 diffuse = sample.is_background ? black() : s.diffuse * (white() - fresnel) * sample.cosine;
             const Float lobe = rough_lobe(s, to_eye, half_vector, sample, visibility, rays_follow);
             reflected = select(s.is_rough, diffuse + fresnel * lobe, reflected);

@@ -45,9 +45,9 @@ ARHOST_INLINE Float importance_of(const Work &work, const Paths &paths) {
 // Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly,
 // and for the denoiser where glass is seen. `choice`: 0 to 1; `roulette`: see survive().
 ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &from, const Surface &s, Vec3 direction,
-                                         const arhost_material &material, Float choice, Pair roulette, Bool active) {
-    const Pair uv = material.roughness > 0 ? path_pair(work, from, facet_dimension) : Pair{};
-    const Paths paths = unseen_where(from, bool_of(material.roughness > 0));
+                                         const Glass &material, Float choice, Pair roulette, Bool active) {
+    const Pair uv = material.is_rough ? path_pair(work, from, facet_dimension) : Pair{};
+    const Paths paths = unseen_where(from, bool_of(material.is_rough));
     const GlassScatter glass = scatter_at_glass(s, direction, material, uv, active);
     const Vec3 arriving = paths.throughput * glass.transmittance;
     const Float importance = importance_of(work, paths);
@@ -61,9 +61,9 @@ ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &from, const Su
             enqueue(work, next, origin, towards, throughput, goes_on);
     };
     follow(reflects, s.position + s.geometric_normal * s.offset, glass.reflected,
-           arriving * splat(material.reflectivity) * glass.unmasked_reflected, glass.reflectance, roulette.u);
+           arriving * material.reflection * glass.unmasked_reflected, glass.reflectance, roulette.u);
     follow(~reflects, s.position - s.geometric_normal * s.offset, glass.refracted,
-           arriving * splat(material.refraction) * glass.unmasked_refracted, Float(1.0f) - glass.reflectance,
+           arriving * material.refraction * glass.unmasked_refracted, Float(1.0f) - glass.reflectance,
            select(both, roulette.v, roulette.u));
 }
 
@@ -79,8 +79,16 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
     for_each_object(work.frame.scene, rays.hit, active, [&](const Object &object, Bool here) {
         const arhost_material &material = *object.material;
         if (material.model == ARHOST_MATERIAL_GLASS) {
-            scatter_path_in_glass(work, paths, s, direction, material, choice.v, roulette, here);
+            scatter_path_in_glass(work, paths, s, direction, glass_of(material, s), choice.v, roulette, here);
             opaque = opaque & ~here;
+        } else if (material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS && material.transmission > 0) {
+            const Bool transmits = here & (choice.v < s.transmission);
+            if (!any(transmits))
+                return;
+            scatter_path_in_glass(work, unseen_where(paths, s.transmission < Float(1.0f)), s, direction,
+                                  glass_of(material, s), choice.v / max(s.transmission, Float(1e-6f)), roulette,
+                                  transmits);
+            opaque = opaque & ~transmits;
         } else if (material.model == ARHOST_MATERIAL_MIRROR) {
             mirror_reflectance = select(here, splat(material.reflectivity), mirror_reflectance);
             mirror_chance = select(here, Float(1.0f), mirror_chance);
@@ -102,12 +110,17 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
     Bool scatters = opaque & ~mirrors & s.is_lit;
     if (!any(scatters))
         return;
-    const Float chance = specular_chance(s, to_eye);
-    const Bool specular = choice.u < chance;
+    const LobeChances chance = lobe_chances(s, to_eye);
+    const Float below = Float(1.0f) - chance.coat;
+    const Bool specular = choice.u < chance.specular * below;
     const Pair uv = path_pair(work, paths, scatter_dimension);
     Vec3 out = cosine_direction(s.normal, uv.u, uv.v);
     if (s.any_rough && any(specular & scatters))
         out = select(specular, mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v)),
+                     out);
+    if (const Bool by_coat = choice.u >= below; s.any_coat && any(by_coat & scatters))
+        out = select(by_coat,
+                     mirror_direction(direction, ggx_half_vector(s.coat_normal, to_eye, s.coat_alpha, uv.u, uv.v)),
                      out);
     const Float cosine = dot(out, s.normal);
     const Float density = scattering_density(s, to_eye, out, chance);
@@ -122,11 +135,28 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
                 Float(1.0f) / max(density, Float(1e-30f)));
 }
 
-// Adds the light of surfaces behind mirrors and glass to Scratch::seen.
-ARHOST_FUNCTION void add_seen(Work &work, const Paths &paths, Vec3 light, Bool active) {
-    if (!work.frame.denoising || paths.depth == 0)
+// Queues what the eye sees through surfaces in proportion to 1 − their opacity, and reduces the throughput of `paths`
+// to their opacity. Rays that do not come from the eye pass such surfaces at random (HitFilter).
+ARHOST_INLINE void pass_translucent(Work &work, Paths &paths, const Surface &s, Vec3 direction, Bool active) {
+    active = active & is_seen(paths) & (s.opacity < Float(1.0f));
+    if (!any(active))
+        return;
+    const Vec3 passing = paths.throughput * (Float(1.0f) - s.opacity);
+    const Bool goes_on = active & (largest(passing) > Float(min_throughput));
+    if (paths.depth < work.frame.scene.max_depth && any(goes_on))
+        enqueue(work, paths, s.position - s.geometric_normal * s.offset, direction, passing, goes_on);
+    paths.throughput = paths.throughput * select(active, s.opacity, Float(1.0f));
+}
+
+// Adds the light of surfaces behind mirrors, glass and translucent surfaces to Scratch::seen. `is_translucent`: the
+// surface, which adds its own part.
+ARHOST_FUNCTION void add_seen(Work &work, const Paths &paths, Vec3 light, Bool active,
+                              Bool is_translucent = bool_of(false)) {
+    if (!work.frame.denoising)
         return;
     active = active & is_seen(paths);
+    if (paths.depth == 0)
+        active = active & is_translucent;
     if (!any(active))
         return;
     const Vec3 arriving = paths.throughput * light;
@@ -149,7 +179,8 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
     Paths paths = from;
     Surface s = surface_at(scene, rays, active);
     if (work.frame.denoising && s.any_rough)
-        s.alpha = select(paths.inverse_density == Float(0.0f), s.alpha, max(s.alpha, Float(least_scattered_alpha)));
+        s.alpha = select((paths.inverse_density == Float(0.0f)) | (s.transmission > Float(0.0f)), s.alpha,
+                         max(s.alpha, Float(least_scattered_alpha)));
     const Vec3 direction = normalize(direction_of(rays.ray));
     if (paths.depth > 0)
         active = active & ~(s.is_real & sees_only_virtual(paths));
@@ -161,6 +192,8 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
     }
     if (!any(active))
         return;
+    if (s.any_translucent)
+        pass_translucent(work, paths, s, direction, active);
     if (paths.depth == 1)
         if (const Bool mirrored = active & is_mirrored(paths); any(mirrored))
             add_covered(work, paths, rays.ray, mirrored);
@@ -174,9 +207,11 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
                                                         inverse_density);
         add_radiance(work, paths, emission, emits);
     }
-    add_seen(work, paths, select(emits, s.emission, divisor_of(s)), active & (emits | s.is_lit));
+    const Float lit_share = Float(1.0f) - s.transmission;
+    add_seen(work, paths, select(emits, s.emission, divisor_of(s) * lit_share), active & (emits | s.is_lit),
+             (s.opacity < Float(1.0f)) | (s.transmission > Float(0.0f)));
     const bool scatters = paths.depth < scene.max_depth;
-    const Bool lit = active & s.is_lit;
+    const Bool lit = active & s.is_lit & (s.transmission < Float(1.0f));
     if (any(lit)) {
         const PhotonLight by_photons = photon_light(
             work, paths, s, lit, [&](Vec3 power, Vec3 to_light) __attribute__((always_inline)) {
@@ -184,7 +219,8 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
                 return PhotonLight{power * scattered * (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f))),
                                    black()};
             });
-        add_radiance(work, paths, by_photons.light + sampled_light(work, paths, s, -direction, scatters, lit), lit);
+        const Vec3 light = by_photons.light + sampled_light(work, paths, s, -direction, scatters, lit);
+        add_radiance(work, paths, light * lit_share, lit);
     }
     if (scatters)
         scatter_path(work, paths, rays, s, direction, active);
@@ -195,7 +231,8 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
     const Scene &scene = work.frame.scene;
     const QueuedRays next = take_packet(work, depth);
     RTCRayHit16 rays;
-    set_ray(rays.ray, next.origin, next.direction, Float(far_away), Int(all_masks));
+    set_ray(rays.ray, next.origin, next.direction, Float(far_away), Int(all_masks),
+            select(is_seen(next.paths), Int(ray_of_eye), Int(0)));
     const Bool hit = trace(scene, scene.root, make_query(Coherence::incoherent), rays, next.active);
     const Bool sees_all = next.active & ~sees_only_virtual(next.paths);
     const Bool missed = sees_all & ~hit;
@@ -268,7 +305,7 @@ ARHOST_INLINE void trace_deferred(const Work &work, DeferredPixels &deferred, RT
         };
         RTCRayHit16 rays;
         set_ray(rays.ray, splat(work.frame.camera.eye), {row(0), row(1), row(2)}, Float(far_away),
-                Int(static_cast<int>(mask)));
+                Int(static_cast<int>(mask)), Int(ray_of_eye));
         const Bool hit = trace(work.frame.scene, bvh, query, rays, active);
         if (any(hit))
             shade(Paths{select(active, bits_of(row(3)), Int(0)), -1, white(), 0, Float(0.0f)}, rays, hit);

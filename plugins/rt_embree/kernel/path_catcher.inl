@@ -139,7 +139,7 @@ ARHOST_INLINE Bool mirrors_virtual(const PathScene &path, const Surface &s, Vec3
             ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, normalize(densest + to_eye)), s.alpha);
         share = share + min(density * cone.slope * Float(6.28318531f), Float(1.0f));
     }
-    return s.is_rough & (largest(schlick(s.specular, dot(s.normal, to_eye))) * share >= Float(1.0f / 256));
+    return s.is_rough & (largest(fresnel_of(s, dot(s.normal, to_eye))) * share >= Float(1.0f / 256));
 }
 
 // Returns the lanes in which virtual objects hide a lamp's or the environment's sample from a real surface.
@@ -300,7 +300,7 @@ ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRay
     if (any_glossy) {
         add_radiance(work, of_gloss, mirrored + by_photons.mirrored, glossy);
         add_radiance(work, in_plane(paths, covered_plane), covered, glossy);
-        const Vec3 matt = s.diffuse * (white() - schlick(s.specular, dot(s.normal, to_eye))) * before;
+        const Vec3 matt = s.diffuse * (white() - fresnel_of(s, dot(s.normal, to_eye))) * before;
         const int first = paths.first_pixel & (tile_pixels - 1);
         add_to_sum(work.scratch, matt_row, first, select(glossy, matt.x, Float(0.0f)));
         add_to_sum(work.scratch, matt_row + 1, first, select(glossy, matt.y, Float(0.0f)));
@@ -398,12 +398,15 @@ ARHOST_INLINE Vec3 environment_towards(const Work &work, const Paths &paths, Vec
     const Bool is_specular = active & (paths.inverse_density == Float(0.0f)) & ~changes_catcher(paths);
     if (frame.path.video.image.texels && any(is_specular)) {
         const Filmed filmed = filmed_towards(frame, direction);
-        Bool seen = is_specular & filmed.inside & (largest(filmed.light) < Float(saturated_video));
+        Bool seen = is_specular & filmed.inside;
         if (any(seen)) {
             RTCRay16 ray;
             set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(real_masks));
             seen = seen & ~blocked(frame.scene, ray, seen);
-            light = select(seen, filmed.light, light);
+            const Bool saturated = largest(filmed.light) >= Float(saturated_video); // the light may be brighter
+            const Vec3 brighter{max(light.x, filmed.light.x), max(light.y, filmed.light.y),
+                                max(light.z, filmed.light.z)};
+            light = select(seen, select(saturated, brighter, filmed.light), light);
         }
         if (const Bool unseen = is_specular & ~filmed.inside; frame.surroundings && any(unseen)) {
             const Remembered remembered = remembered_towards(*frame.surroundings, direction, unseen);

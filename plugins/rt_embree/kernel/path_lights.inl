@@ -187,7 +187,7 @@ ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const Source
 ARHOST_INLINE Vec3 sampled_light(const Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, bool scatters,
                                  Bool active) {
     const Scene &scene = work.frame.scene;
-    const Float chance = specular_chance(s, to_eye);
+    const LobeChances chance = lobe_chances(s, to_eye);
     const int count = source_samples(work.frame, paths.depth);
     const SourcePairs pairs = source_pairs(work, paths);
     Vec3 sum = black();

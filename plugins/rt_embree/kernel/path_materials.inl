@@ -4,14 +4,30 @@
 #pragma once
 #include "scatter.inl"
 
-// The chance that a lit surface scatters a ray by its specular lobe.
+// The chances that a lit surface scatters a ray by its clear coat, and, if not, by its specular lobe.
+struct LobeChances {
+    Float coat, specular;
+};
+
+// The chance that a lit surface scatters a ray that its clear coat does not scatter by its specular lobe.
 ARHOST_INLINE Float specular_chance(const Surface &s, Vec3 to_eye) {
     if (!s.any_rough)
         return Float(0.0f);
-    const Float specular = luminance(schlick(s.specular, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
+    const Float specular = luminance(fresnel_of(s, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
     const Float chance = specular / max(specular + diffuse, Float(1e-6f));
     const Float bounded = min(max(chance, Float(0.1f)), Float(0.9f));
     return select(s.is_rough, select(diffuse > Float(0.0f), bounded, Float(1.0f)), Float(0.0f));
+}
+
+ARHOST_INLINE LobeChances lobe_chances(const Surface &s, Vec3 to_eye) {
+    const Float specular = specular_chance(s, to_eye);
+    if (!s.any_coat)
+        return {Float(0.0f), specular};
+    const Float coat = Float(1.0f) - below_coat(s, to_eye);
+    const Float below =
+        (luminance(fresnel_of(s, dot(s.normal, to_eye))) + luminance(s.diffuse)) * (Float(1.0f) - coat);
+    const Float chance = min(max(coat / max(coat + below, Float(1e-6f)), Float(0.1f)), Float(0.9f));
+    return {select(s.coat > Float(0.0f), chance, Float(0.0f)), specular};
 }
 
 // Returns the highlights of SPECULAR and METAL. Only light samples bring them; scattered rays do not follow this
@@ -28,9 +44,15 @@ ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     Vec3 scattered = s.diffuse * cosine;
     if (s.any_rough) {
         const Vec3 half_vector = normalize(to_light + to_eye);
-        const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
+        const Vec3 fresnel = fresnel_of(s, dot(to_eye, half_vector));
         const Float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
         scattered = select(s.is_rough, s.diffuse * (white() - fresnel) * cosine + fresnel * lobe, scattered);
+        if (s.any_coat) {
+            const Float coat = s.coat * coat_reflectance(dot(to_eye, half_vector)) *
+                               ggx_lobe(lambert(s.coat_normal, to_light), dot(s.coat_normal, to_eye),
+                                        dot(s.coat_normal, half_vector), s.coat_alpha);
+            scattered = scattered * below_coat(s, to_eye) + Vec3{coat, coat, coat};
+        }
     }
     return scattered;
 }
@@ -40,10 +62,10 @@ ARHOST_INLINE Vec3 gloss(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     const Vec3 half_vector = normalize(to_light + to_eye);
     const Float lobe =
         ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-    return select(s.is_rough, schlick(s.specular, dot(to_eye, half_vector)) * lobe, black());
+    return select(s.is_rough, fresnel_of(s, dot(to_eye, half_vector)) * lobe, black());
 }
 
-// Density per steradian of the rays that a lit surface scatters.
+// Density per steradian of the rays that a lit surface without a clear coat scatters. `chance`: of the specular lobe.
 ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, Float chance) {
     Float density = lambert(s.normal, to_light) * Float(0.318309886f) * (Float(1.0f) - chance);
     if (s.any_rough)
@@ -53,6 +75,16 @@ ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_li
                                                              dot(s.normal, normalize(to_light + to_eye)), s.alpha),
                              Float(0.0f));
     return select(dot(to_light, s.geometric_normal) > Float(0.0f), density, Float(0.0f));
+}
+
+ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, const LobeChances &chances) {
+    const Float density = scattering_density(s, to_eye, to_light, chances.specular);
+    if (!s.any_coat)
+        return density;
+    const Float by_coat = ggx_reflection_density(dot(s.coat_normal, to_eye),
+                                                 dot(s.coat_normal, normalize(to_light + to_eye)), s.coat_alpha);
+    return density +
+           select(dot(to_light, s.geometric_normal) > Float(0.0f), (by_coat - density) * chances.coat, Float(0.0f));
 }
 
 // The chance that METAL, a mirror over a diffuse surface, reflects a ray like a mirror.
@@ -77,25 +109,48 @@ ARHOST_INLINE Float unmasked(Vec3 direction, Vec3 normal, Vec3 geometric_normal,
     return select(leaves, ggx_masking(cosine, alpha), Float(0.0f));
 }
 
+// The glass of a GLASS material, or of the part of a metallic-roughness material that transmits light.
+struct Glass {
+    float index;
+    bool is_rough, is_thin;
+    Float alpha; // GGX roughness parameter, if it is rough
+    Vec3 reflection, refraction, extinction;
+};
+ARHOST_INLINE Glass glass_of(const arhost_material &material, const Surface &s) {
+    const bool is_part = material.model != ARHOST_MATERIAL_GLASS;
+    return {material.index,
+            material.roughness > 0,
+            is_part && material.thin_walled != 0,
+            is_part ? s.alpha : ggx_alpha(Float(material.roughness)),
+            is_part ? white() : splat(material.reflectivity),
+            is_part ? s.transmitted : splat(material.refraction),
+            splat(material.extinction)};
+}
+
 // `uv`: random numbers that choose the microfacet of rough glass (Walter et al., Microfacet Models for Refraction,
 // EGSR 2007).
-ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const arhost_material &glass, Pair uv,
+ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const Glass &glass, Pair uv,
                                             Bool active) {
-    const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
+    const Bool from_inside = s.back_face & bool_of(!glass.is_thin);
+    const Float ratio = select(from_inside, Float(glass.index), Float(1 / glass.index));
     GlassScatter scatter;
-    scatter.transmittance = select(s.back_face, bouguer(splat(glass.extinction), s.distance), white());
+    scatter.transmittance = select(from_inside, bouguer(glass.extinction, s.distance), white());
     Refraction refraction;
-    if (glass.roughness > 0) {
-        const Float alpha = ggx_alpha(Float(glass.roughness));
+    if (glass.is_rough) {
+        const Float alpha = glass.alpha;
         const Vec3 facet = ggx_half_vector(s.normal, -direction, alpha, uv.u, uv.v);
         refraction = refraction_at(direction, facet, ratio);
         scatter.reflected = mirror_direction(direction, facet);
+        if (glass.is_thin)
+            refraction.direction = mirror_direction(scatter.reflected, s.normal);
         // Sampling visible normals already accounts for the masking of `direction`.
         scatter.unmasked_reflected = unmasked(scatter.reflected, s.normal, s.geometric_normal, alpha);
         scatter.unmasked_refracted = unmasked(refraction.direction, -s.normal, -s.geometric_normal, alpha);
     } else {
         refraction = refraction_of(s, direction, ratio, active);
         scatter.reflected = reflected(s, direction);
+        if (glass.is_thin)
+            refraction.direction = direction;
         scatter.unmasked_reflected = scatter.unmasked_refracted = Float(1.0f);
     }
     scatter.refracted = refraction.direction;

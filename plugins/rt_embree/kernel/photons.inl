@@ -163,21 +163,26 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
                 next_origin = select(mirrored, above, next_origin);
                 next_direction = select(mirrored, reflected(s, direction), next_direction);
                 specular = specular | mirrored;
-            } else if (material.model == ARHOST_MATERIAL_GLASS) {
+            } else if (material.model == ARHOST_MATERIAL_GLASS || material.transmission > 0) {
+                const Float share =
+                    select(bool_of(material.model == ARHOST_MATERIAL_GLASS), Float(1.0f), s.transmission);
+                const Bool transmits = here & (choice < share);
                 const Pair uv = material.roughness > 0
                                     ? photon_pair(number, first_facet_dimension + static_cast<int>(bounce))
                                     : Pair{};
-                const GlassScatter glass = scatter_at_glass(s, direction, material, uv, here);
-                const Bool reflects = here & (choice < glass.reflectance);
-                power = select(here,
-                               power * glass.transmittance *
-                                   select(reflects, splat(material.reflectivity) * glass.unmasked_reflected,
-                                          splat(material.refraction) * glass.unmasked_refracted),
-                               power);
-                next_origin =
-                    select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), next_origin);
-                next_direction = select(here, select(reflects, glass.reflected, glass.refracted), next_direction);
-                specular = specular | here;
+                const Glass glass = glass_of(material, s);
+                const GlassScatter scatter = scatter_at_glass(s, direction, glass, uv, transmits);
+                const Bool reflects = transmits & (choice < scatter.reflectance * share);
+                power = select(transmits,
+                               power * scatter.transmittance *
+                                   select(reflects, glass.reflection * scatter.unmasked_reflected,
+                                          glass.refraction * scatter.unmasked_refracted),
+                               select(here, power * (Float(1.0f) / max(Float(1.0f) - share, Float(1e-6f))), power));
+                next_origin = select(transmits, select(reflects, above, s.position - s.geometric_normal * s.offset),
+                                     next_origin);
+                next_direction =
+                    select(transmits, select(reflects, scatter.reflected, scatter.refracted), next_direction);
+                specular = specular | transmits;
             }
         });
         if (bounce > 0) {

@@ -37,7 +37,7 @@ ARHOST_INLINE PrimaryHits trace_primary(const Scene &scene, Vec3 eye, Vec3 direc
     near = near & active;
     Bool hit = bool_of(false), occluded = bool_of(false);
     if (any(near)) {
-        set_ray(hits.rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
+        set_ray(hits.rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask), Int(ray_of_eye));
         hit = trace(scene, scene.root, make_query(Coherence::coherent), hits.rays, near);
     }
     if (scene.has_occluders && any(hit))

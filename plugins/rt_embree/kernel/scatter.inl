@@ -180,7 +180,7 @@ ARHOST_INLINE RoughReflection sample_rough(const Surface &s, Vec3 to_eye, Pair u
     const Vec3 direction = mirror_direction(-to_eye, half_vector);
     const Float cosine = dot(direction, s.normal);
     // Sampling visible normals already accounts for the masking of `to_eye`.
-    return {direction, schlick(s.specular, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha),
+    return {direction, fresnel_of(s, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha),
             ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha),
             (cosine > Float(0.0f)) & (dot(direction, s.geometric_normal) > Float(0.0f))};
 }
@@ -207,6 +207,8 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
     if (any(lit))
         add_radiance(work, paths, direct_light(work.frame, s, -direction, rays_follow, lit, random_of(work, paths)),
                      lit);
+    if (const Bool unlit = active & s.is_unlit; any(unlit))
+        add_radiance(work, paths, s.emission, unlit);
     if (!s.any_scattering)
         return;
     if (!rays_follow) {
@@ -259,7 +261,7 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
     const QueuedRays next = take_packet(work, depth);
     const Paths &paths = next.paths;
     RTCRayHit16 rays;
-    set_ray(rays.ray, next.origin, next.direction, Float(far_away), Int(all_masks));
+    set_ray(rays.ray, next.origin, next.direction, Float(far_away), Int(all_masks), Int(ray_of_eye));
     const Bool hit =
         trace(work.frame.scene, work.frame.scene.root, make_query(Coherence::incoherent), rays, next.active);
     const Bool missed = next.active & ~hit;

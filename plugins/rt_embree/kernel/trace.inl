@@ -6,7 +6,9 @@
 
 constexpr int no_hit = static_cast<int>(RTC_INVALID_GEOMETRY_ID);
 
-template <class Ray> ARHOST_INLINE void set_ray(Ray &ray, Vec3 origin, Vec3 direction, Float end, Int mask) {
+// `flags`: of RayFlag.
+template <class Ray>
+ARHOST_INLINE void set_ray(Ray &ray, Vec3 origin, Vec3 direction, Float end, Int mask, Int flags = Int(0)) {
     store(ray.org_x, origin.x);
     store(ray.org_y, origin.y);
     store(ray.org_z, origin.z);
@@ -18,7 +20,7 @@ template <class Ray> ARHOST_INLINE void set_ray(Ray &ray, Vec3 origin, Vec3 dire
     store(ray.tfar, end);
     store(ray.mask, mask);
     store(ray.id, Int(0));
-    store(ray.flags, Int(0));
+    store(ray.flags, flags);
 }
 ARHOST_INLINE Vec3 origin_of(const RTCRay16 &ray) {
     return {load(ray.org_x), load(ray.org_y), load(ray.org_z)};

@@ -13,7 +13,9 @@ const float LEAST_DIVISOR = 1.0 / 64.0; // of the light of virtual objects
 
 // The denoiser divides the light of a surface by its albedo, so that textures stay sharp. `is_lit`: neither a mirror nor
 // glass.
-vec3 divisor_of(Surface s, bool is_lit) {
+vec3 divisor_of(Surface s, bool is_lit, bool is_unlit) {
+    if (is_unlit)
+        return max(s.emission, LEAST_DIVISOR);
     if (!is_lit || largest(s.emission) > 0.0)
         return vec3(1.0);
     return max(s.is_rough ? s.diffuse + s.specular : s.diffuse, LEAST_DIVISOR);
@@ -34,7 +36,11 @@ void follow_specular(Ray ray, Hit hit) {
         }
         uint material = objects[hit.object].material, model = materials[material].model;
         bool is_glass = has_glass && model == GLASS && materials[material].roughness == 0.0;
-        if (model != MIRROR && !is_glass) {
+        if ((has_glass && materials[material].transmission > 0.0) || (objects[hit.object].flags & BLENDS) != 0u)
+            add_material(s, hit, -towards);
+        is_glass = is_glass || s.transmission > 0.5;
+        bool is_passed = s.opacity < 0.5;
+        if (model != MIRROR && !is_glass && !is_passed) {
             guides.position = frame.eye + through_pixel * travelled;
             guides.normal = s.normal;
             guides.surface += ((hit.object & 1023u) + 1u) * MIRRORED_UNIT;
@@ -42,15 +48,18 @@ void follow_specular(Ray ray, Hit hit) {
         }
         bool refracts = false;
         vec3 next;
-        if (is_glass) {
-            GlassScatter glass = scatter_at_glass(s, towards, material, vec2(0.0));
+        if (is_passed) {
+            refracts = true;
+            next = towards;
+        } else if (is_glass) {
+            GlassScatter glass = scatter_at_glass(s, towards, material, vec2(0.0), false);
             refracts = glass.reflectance <= 0.5;
             next = refracts ? glass.refracted : glass.reflected;
         } else {
             next = reflected(s, towards);
         }
         towards = normalize(next);
-        ray = Ray(refracts ? below(s) : above(s), towards, INFINITY, ALL_MASKS);
+        ray = Ray(refracts ? below(s) : above(s), towards, INFINITY, ALL_MASKS | OF_EYE);
         hit = trace(ray, false, false);
     }
 }

@@ -60,23 +60,81 @@ void to_object_space(uint object, Ray ray, out vec3 origin, out vec3 direction) 
     }
 }
 
-vec2 texcoord_at(uint object, uint number, vec2 uv) {
-    uint first = objects[object].first_index + 3u * number, base = objects[object].first_texcoord;
+// Returns where a texture is looked up at a vertex.
+vec2 texcoord_of(uint object, uint vertex, uint number) {
+    uint from = objects[object].first_texcoord +
+                2u * (textures[number].texcoord_set * objects[object].vertex_count + vertex);
+    vec2 columns[3] = textures[number].image_from_texcoord;
+    return columns[0] * attributes[from] + columns[1] * attributes[from + 1u] + columns[2];
+}
+vec2 texcoord_at(uint object, uint triangle, vec2 uv, uint number) {
+    uint first = objects[object].first_index + 3u * triangle;
     vec3 weights = vec3(1.0 - uv.x - uv.y, uv.x, uv.y);
     vec2 sum = vec2(0.0);
+    for (int i = 0; i < 3; ++i)
+        sum += texcoord_of(object, indices[first + uint(i)], number) * weights[i];
+    return sum;
+}
+
+vec4 texel_at_hit(Hit hit, uint number) {
+    if (objects[hit.object].first_texcoord == NONE)
+        return vec4(1.0);
+    return sample_texture(number, texcoord_at(hit.object, primitives[hit.primitive].number, hit.uv, number));
+}
+
+// Returns the linear colour and the opacity of the vertices of a triangle; white if the object has none.
+vec4 vertex_colour(uint object, uint triangle, vec2 uv) {
+    uint base = objects[object].first_colour, first = objects[object].first_index + 3u * triangle;
+    if (base == NONE)
+        return vec4(1.0);
+    vec3 weights = vec3(1.0 - uv.x - uv.y, uv.x, uv.y);
+    vec4 sum = vec4(0.0);
     for (int i = 0; i < 3; ++i) {
-        uint from = base + 2u * indices[first + uint(i)];
-        sum += vec2(attributes[from], attributes[from + 1u]) * weights[i];
+        uint from = base + 2u * indices[first + uint(i)], low = indices[from], high = indices[from + 1u];
+        sum += vec4(low & 0xffffu, low >> 16, high & 0xffffu, high >> 16) * (weights[i] * (1.0 / 65535.0));
     }
     return sum;
 }
 
-bool is_hole(uint object, uint primitive, vec2 uv) {
-    if (!has_holes || (objects[object].flags & HAS_HOLES) == 0u)
+float opacity_at(uint object, uint triangle, vec2 uv) {
+    uint material = objects[object].material, number = materials[material].colour_texture;
+    float opacity = materials[material].opacity * vertex_colour(object, triangle, uv).a;
+    if (has_textures && number != NONE && objects[object].first_texcoord != NONE)
+        opacity *= sample_texture(number, texcoord_at(object, triangle, uv, number)).a;
+    return opacity;
+}
+
+const float LEAST_OPACITY = 1.0 / 512.0; // the eye does not see points of a lower opacity
+
+// Returns a number from 0 to 1 that depends on a ray and a triangle only.
+float random_of_hit(vec3 origin, vec3 direction, uint triangle) {
+    uint bits[7] = uint[](floatBitsToUint(origin.x), floatBitsToUint(origin.y), floatBitsToUint(origin.z),
+                          floatBitsToUint(direction.x), floatBitsToUint(direction.y), floatBitsToUint(direction.z),
+                          triangle);
+    uint hash = 0u;
+    for (int i = 0; i < 7; ++i) { // MurmurHash3's finalizer
+        hash = (hash ^ bits[i]) * 0x85ebca6bu;
+        hash = (hash ^ (hash >> 13)) * 0xc2b2ae35u;
+        hash ^= hash >> 16;
+    }
+    return float(hash >> 8) * (1.0 / 16777216.0);
+}
+
+// Returns whether a ray passes a triangle: where it is cut out, at back faces that are hidden from the eye, and, of other
+// rays, at random where the triangle is translucent. `origin`, `direction`: of the ray in object space.
+bool passes(uint object, uint primitive, vec2 uv, vec3 origin, vec3 direction, bool of_eye) {
+    uint flags = objects[object].flags, triangle = primitives[primitive].number;
+    if (!has_holes || (flags & (HAS_HOLES | HIDES_BACK_FACES | BLENDS)) == 0u)
         return false;
-    uint material = objects[object].material;
-    vec2 texcoord = texcoord_at(object, primitives[primitive].number, uv);
-    return sample_texture(materials[material].colour_texture, texcoord).a < materials[material].alpha_cutoff;
+    if (of_eye && (flags & HIDES_BACK_FACES) != 0u &&
+        ordered_dot(ordered_cross(primitives[primitive].edge_2, primitives[primitive].edge_1), direction) >= 0.0)
+        return true;
+    if ((flags & (HAS_HOLES | BLENDS)) == 0u)
+        return false;
+    float opacity = opacity_at(object, triangle, uv);
+    if (opacity < materials[objects[object].material].alpha_cutoff)
+        return true;
+    return (flags & BLENDS) != 0u && opacity < (of_eye ? LEAST_OPACITY : random_of_hit(origin, direction, triangle));
 }
 
 // Intersects a ray with a triangle by the Möller-Trumbore algorithm, with the same operations as Embree. If the hit is

@@ -16,7 +16,7 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
     stack_size = 0;
     int stage = PRIMARY_STAGE;
     Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE, false);
-    Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
+    Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK | OF_EYE);
     for (;;) {
         Hit hit = trace(ray, false, stage == CATCHER_STAGE);
         bool is_hit = hit.object != NONE;
@@ -43,10 +43,12 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
             Surface s = surface_at(ray, hit, true);
             vec3 direction = normalize(ray.direction);
             uint material = objects[hit.object].material, model = materials[material].model;
-            bool catches = stage == CATCHER_STAGE, is_lit = model != MIRROR && model != GLASS;
+            bool catches = stage == CATCHER_STAGE, is_lit = model != MIRROR && model != GLASS && model != UNLIT;
             Random path_random = Random(random.pixel ^ (path.depth << 12), random.seed, random.number);
-            if (is_lit && !catches)
-                add_material(s, hit);
+            if ((is_lit || model == UNLIT) && !catches)
+                add_material(s, hit, -direction);
+            if (model == UNLIT && !catches)
+                light += path.throughput * s.emission;
             if (is_lit || catches) {
                 bool rays_follow = path.depth < frame.max_depth;
                 DirectLight sum = direct_light(s, -direction, catches, rays_follow, path_random);
@@ -63,7 +65,7 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
         if (stack_size == 0)
             break;
         path = stack[--stack_size];
-        ray = Ray(path.origin, path.direction, INFINITY, ALL_MASKS);
+        ray = Ray(path.origin, path.direction, INFINITY, ALL_MASKS | OF_EYE);
         stage = PATH_STAGE;
     }
     // Radiance is averaged in linear light and encoded only once. sRGB codes are not linear and limited to 1, so

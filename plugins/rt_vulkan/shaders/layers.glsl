@@ -38,11 +38,27 @@ uint kind_of(uint surface) {
     return surface & 3u;
 }
 
-// Returns the number of the surface of an object, as surface_number().
-uint surface_of(uint object) {
+// Returns whether the eye sees through a surface, clearly.
+bool is_seen_through(Hit hit) {
+    uint material = objects[hit.object].material, number = materials[material].transmission_texture;
+    if (has_holes && (objects[hit.object].flags & BLENDS) != 0u &&
+        opacity_at(hit.object, primitives[hit.primitive].number, hit.uv) < 1.0)
+        return true;
+    const float clear = 0.05; // roughness
+    float transmission = materials[material].transmission;
+    if (!has_glass || !(transmission > 0.0) || materials[material].roughness > clear)
+        return false;
+    return transmission * (has_textures && number != NONE ? texel_at_hit(hit, number).x : 1.0) > 0.5;
+}
+
+// Returns the number of the surface at a hit, as surface_number(). Surfaces that are seen through are specular.
+uint surface_of(Hit hit) {
+    uint object = hit.object;
     uint material = objects[object].material, model = materials[material].model, kind = SCATTERING_SURFACE;
     if (objects[object].role != VIRTUAL)
         kind = REAL_SURFACE;
+    else if (is_seen_through(hit))
+        kind = SPECULAR_SURFACE;
     else if (model == METAL || model == METALLIC_ROUGHNESS || (model == GLASS && materials[material].roughness > 0.0))
         kind = GLOSSY_SURFACE;
     else if (model == MIRROR || model == GLASS)

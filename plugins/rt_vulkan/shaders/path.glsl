@@ -21,16 +21,22 @@ vec3 bounded(vec3 rgb) {
 }
 
 // Returns whether a path from the eye has been scattered only by mirrors and glass, and by no random choice.
+bool is_of_eye(Path path) {
+    return !path.is_random && path.inverse_density == 0.0 && path.plane == OBJECT_PLANE;
+}
+
+// Returns whether the denoiser uses `seen` of a path.
 bool is_seen(Path path) {
-    return is_denoised() && !path.is_random && path.inverse_density == 0.0 && path.plane == OBJECT_PLANE;
+    return is_denoised() && is_of_eye(path);
 }
 
 // A sum over the samples of a pixel: the light of lamps, of the environment and of the video that mirrors and glass show,
 // and the albedo of virtual objects that they show. Only paths with is_seen() count.
 vec3 seen;
 
-void add_seen(Path path, vec3 light) {
-    if (path.depth > 0u && is_seen(path))
+// `is_translucent`: the surface, which adds its own part.
+void add_seen(Path path, vec3 light, bool is_translucent) {
+    if ((path.depth > 0u || is_translucent) && is_seen(path))
         seen += max(bounded(path.throughput * light), 0.0);
 }
 
@@ -59,10 +65,10 @@ vec2 roulette_pair(Path path, Random random) {
 void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, float choice, Random random) {
     vec2 uv = materials[material].roughness > 0.0 ? path_pair(random, FACET_DIMENSION, 0u, 1u) : vec2(0.0);
     path.is_random = path.is_random || materials[material].roughness > 0.0;
-    GlassScatter glass = scatter_at_glass(s, direction, material, uv);
+    GlassScatter glass = scatter_at_glass(s, direction, material, uv, materials[material].roughness > 0.0);
     vec3 arriving = path.throughput * glass.transmittance;
-    vec3 by_reflection = arriving * materials[material].reflectivity * glass.unmasked_reflected,
-         by_refraction = arriving * materials[material].refraction * glass.unmasked_refracted;
+    vec3 by_reflection = arriving * glass.reflection_tint * glass.unmasked_reflected,
+         by_refraction = arriving * glass.refraction_tint * glass.unmasked_refracted;
     bool reflects = choice < glass.reflectance, refracts = !reflects;
     float importance = importance_of(path);
     bool is_both = path.depth == 0u || importance > 1.0;
@@ -84,8 +90,10 @@ void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, 
 // Pushes a ray that the surface scatters; in glass, there may be two.
 void scatter_path(Path path, Surface s, vec3 direction, uint material, Random random) {
     vec2 choice = path_pair(random, CHOICE_DIMENSION, 0u, 1u);
-    if (has_glass && materials[material].model == GLASS) {
-        scatter_path_in_glass(path, s, direction, material, choice.y, random);
+    float transmission = materials[material].model == GLASS ? 1.0 : s.transmission;
+    if (has_glass && choice.y < transmission) {
+        path.is_random = path.is_random || transmission < 1.0;
+        scatter_path_in_glass(path, s, direction, material, choice.y / transmission, random);
         return;
     }
     vec3 mirror_reflectance;
@@ -98,12 +106,14 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
         return;
     }
     vec3 to_eye = -direction;
-    float specular = specular_chance(s, to_eye);
+    float specular = specular_chance(s, to_eye), by_coat = coat_chance(s, to_eye);
     vec2 uv = path_pair(random, SCATTER_DIMENSION, 0u, 1u);
-    vec3 to = choice.x < specular
-                  ? mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.x, uv.y))
+    bool is_coat = choice.x >= 1.0 - by_coat;
+    vec3 to = is_coat || choice.x < specular * (1.0 - by_coat)
+                  ? mirror_direction(direction, ggx_half_vector(is_coat ? s.coat_normal : s.normal, to_eye,
+                                                                is_coat ? s.coat_alpha : s.alpha, uv.x, uv.y))
                   : cosine_direction(s.normal, uv.x, uv.y);
-    float density = scattering_density(s, to_eye, to, specular);
+    float density = scattering_density(s, to_eye, to, specular, by_coat);
     vec3 throughput = path.throughput * scattering(s, to_eye, to) *
                       (0.318309886 / max(density * (1.0 - mirror_chance), 1e-20));
     if (dot(to, s.normal) > 0.0 && dot(to, s.geometric_normal) > 0.0 && density > 0.0 &&
@@ -121,6 +131,7 @@ vec3 sampled_light(int receiver, Surface s, float form_factors, vec3 to_eye, uin
     // The eye sees filmed surfaces in mirrors and glass, so they get as many samples as those that it sees directly.
     uint count = source_samples(receiver == FILMED_SURFACE ? depth - 1u : depth);
     float specular = receiver == LIT_SURFACE ? specular_chance(s, to_eye) : 0.0;
+    float by_coat = receiver == LIT_SURFACE ? coat_chance(s, to_eye) : 0.0;
     vec3 sum = vec3(0.0);
     for (uint i = 0u; i < count; ++i) {
         SourceSample source = sample_source(s, random, i, count);
@@ -139,11 +150,11 @@ vec3 sampled_light(int receiver, Surface s, float form_factors, vec3 to_eye, uin
             continue;
         float other_density = 0.0; // of scattered rays
         if (scatters && !hides)
-            other_density = receiver == LIT_SURFACE ? scattering_density(s, to_eye, source.direction, specular)
+            other_density = receiver == LIT_SURFACE ? scattering_density(s, to_eye, source.direction, specular, by_coat)
                                                     : bounce_density(s, source.direction, form_factors);
         float weight = balance_weight(source.density, other_density);
         if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough && is_open) {
-            float density = mirrors ? scattering_density(s, to_eye, source.direction, 1.0) : 0.0;
+            float density = mirrors ? scattering_density(s, to_eye, source.direction, 1.0, 0.0) : 0.0;
             vec3 light = gloss(s, to_eye, source.direction) * source.light * balance_weight(source.density, density);
             if (hides)
                 covered += light;
@@ -204,15 +215,17 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
         float end = is_hit ? 1.0 - s.offset * 4.0 / max(length(to_point), 1e-20) : INFINITY;
         // The video shows the side of the surface that faces the camera. A bright video may be saturated.
         is_filmed = filmed_towards(to_point, video) &&
-                    (is_hit ? dot(s.geometric_normal, to_point) < 0.0 : largest(video) < 0.95);
+                    (!is_hit || dot(s.geometric_normal, to_point) < 0.0);
         if (is_filmed && (frame.has_several_real != 0u || !is_hit)) // the video may show a nearer real surface
             is_filmed = trace(Ray(frame.eye, to_point, end, CATCHER_MASK | OCCLUDER_MASK), true, false).object == NONE;
     }
     if (!is_hit) {
-        sum += is_filmed ? video
-                         : arriving_from_environment(ray.direction, path.inverse_density,
-                                                     frame.environment_chance * float(source_samples(path.depth - 1u)));
-        add_seen(path, sum);
+        vec3 light = arriving_from_environment(ray.direction, path.inverse_density,
+                                               frame.environment_chance * float(source_samples(path.depth - 1u)));
+        if (is_filmed)
+            light = largest(video) < 0.95 ? video : max(light, video);
+        sum += light;
+        add_seen(path, sum, false);
         return sum;
     }
     if (is_covered && is_filmed)
@@ -220,24 +233,38 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     vec3 direction = normalize(ray.direction);
     uint material = objects[hit.object].material;
     int receiver = stage == CATCHER_STAGE ? CATCHER_SURFACE : is_filmed ? FILMED_SURFACE : LIT_SURFACE;
-    bool is_lit = materials[material].model != MIRROR && materials[material].model != GLASS;
+    bool is_unlit = materials[material].model == UNLIT;
+    bool is_lit = materials[material].model != MIRROR && materials[material].model != GLASS && !is_unlit;
     bool scatters = path.depth < frame.max_depth;
     vec3 relative = vec3(1.0), before = vec3(0.0); // relative: factor of the reflected light
-    if (is_lit && (receiver != CATCHER_SURFACE || has_gloss))
-        add_material(s, hit);
+    if ((is_lit || is_unlit) && (receiver != CATCHER_SURFACE || has_gloss))
+        add_material(s, hit, -direction);
+    // The eye sees through a translucent surface in proportion to 1 − its opacity.
+    float share = 1.0, lit_share = 1.0 - s.transmission;
+    if (has_holes && s.opacity < 1.0 && is_of_eye(path)) {
+        vec3 passing = path.throughput * (1.0 - s.opacity);
+        if (scatters && largest(passing) > min_throughput)
+            push(path, below(s), direction, passing, path.inverse_density);
+        share = s.opacity;
+    }
+    Path behind = path; // with the light of lamps before the surface
+    path.throughput *= share;
     if (is_denoised()) {
-        if (path.inverse_density != 0.0)
+        if (path.inverse_density != 0.0 && !(s.transmission > 0.0))
             s.alpha = max(s.alpha, LEAST_SCATTERED_ALPHA);
         if (path.depth == 0u && kind_of(guides.surface) != SPECULAR_SURFACE) {
             guides.position = s.position;
             guides.normal = s.normal;
-            guides.albedo = divisor_of(s, is_lit);
+            guides.albedo = divisor_of(s, is_lit, is_unlit);
         }
         bool is_emissive = receiver == LIT_SURFACE && largest(s.emission) > 0.0;
-        add_seen(path, sum + (receiver == FILMED_SURFACE ? video
-                              : is_emissive              ? s.emission
-                              : is_lit                   ? divisor_of(s, is_lit)
-                                                         : vec3(0.0)));
+        add_seen(behind, sum, false);
+        add_seen(path,
+                 receiver == FILMED_SURFACE ? video
+                 : is_emissive              ? s.emission
+                 : is_lit                   ? divisor_of(s, is_lit, is_unlit) * lit_share
+                                            : vec3(0.0),
+                 s.opacity < 1.0 || s.transmission > 0.0);
     }
     if (receiver != LIT_SURFACE || is_covered)
         before = irradiance_without_objects(s);
@@ -247,19 +274,20 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     if (receiver != LIT_SURFACE) {
         relative = vec3(reciprocal(before.x), reciprocal(before.y), reciprocal(before.z));
     } else if (largest(s.emission) > 0.0) {
-        sum += s.emission * (path.depth > 0u ? balance_weight_of_ray(density_of_emitter(s, hit, direction, path.depth),
-                                                                     max(path.inverse_density, 0.0))
-                                             : 1.0);
+        sum += s.emission * share *
+               (path.depth > 0u ? balance_weight_of_ray(density_of_emitter(s, hit, direction, path.depth),
+                                                        max(path.inverse_density, 0.0))
+                                : 1.0);
     }
     if (receiver != LIT_SURFACE && s.is_rough)
         relative *= shadowed_share(s);
     if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
-        matt = s.diffuse * (vec3(1.0) - schlick(s.specular, dot(s.normal, -direction))) * before;
+        matt = s.diffuse * (vec3(1.0) - fresnel_of(s, dot(s.normal, -direction))) * before;
         mirrors = scatters && mirrors_virtual(s, -direction);
     }
     float form_factors = receiver == LIT_SURFACE ? 0.0 : form_factors_of(s);
     vec3 scattered = vec3(0.0);
-    if (receiver != LIT_SURFACE || is_lit) {
+    if (receiver != LIT_SURFACE || (is_lit && lit_share > 0.0)) {
         bool is_caught = receiver == CATCHER_SURFACE;
         PhotonLight by_photons = PhotonLight(vec3(0.0), vec3(0.0));
         if (!is_caught || shows(CAUSTICS_PART))
@@ -284,7 +312,7 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     } else if (scatters && receiver == LIT_SURFACE) {
         scatter_path(path, s, direction, material, random);
     }
-    return sum + scattered;
+    return sum + scattered * (share * (receiver == LIT_SURFACE ? lit_share : 1.0));
 }
 
 // Renders a sample and adds it to the pixel's sums. As in the other integrator, a single loop with a single call of
@@ -297,7 +325,7 @@ void trace_sample(vec3 direction, vec3 near, Random random, inout Sums sums) {
     int stage = PRIMARY_STAGE;
     bool of_catcher = false;
     Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE, false);
-    Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
+    Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK | OF_EYE);
     Hit of_centre;
     for (;;) {
         Hit hit = trace(ray, false, stage == CATCHER_STAGE);
@@ -310,7 +338,7 @@ void trace_sample(vec3 direction, vec3 near, Random random, inout Sums sums) {
             if (is_hit && objects[hit.object].role == VIRTUAL) {
                 sums.coverage += 1.0;
                 if (is_denoised()) {
-                    uint surface = surface_of(hit.object);
+                    uint surface = surface_of(hit);
                     bool is_first = guides.surface == 0u;
                     if (is_first)
                         guides.surface = surface;
@@ -337,7 +365,7 @@ void trace_sample(vec3 direction, vec3 near, Random random, inout Sums sums) {
             of_catcher = true;
             path.plane = CHANGE_PLANE;
             if (is_denoised())
-                guides.surface = surface_of(hit.object);
+                guides.surface = surface_of(hit);
         }
         // The light of catchers and filmed surfaces changes only where they see virtual objects.
         bool is_bounce = path.plane >= FILMED_BIT || (stage == PATH_STAGE && path.depth == 1u &&
@@ -356,6 +384,8 @@ void trace_sample(vec3 direction, vec3 near, Random random, inout Sums sums) {
         path = stack[--stack_size];
         ray = Ray(path.origin, path.direction, INFINITY,
                   has_gloss && path.plane == COVERED_PLANE ? CATCHER_MASK | OCCLUDER_MASK : ALL_MASKS);
+        if (is_of_eye(path))
+            ray.mask |= OF_EYE;
         stage = PATH_STAGE;
     }
     light = bounded(light);

@@ -123,7 +123,7 @@ bool mirrors_virtual(Surface s, vec3 to_eye) {
         float density = ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, normalize(densest + to_eye)), s.alpha);
         share += min(density * cone.slope * 6.28318531, 1.0);
     }
-    return largest(schlick(s.specular, dot(s.normal, to_eye))) * share >= 1.0 / 256.0;
+    return largest(fresnel_of(s, dot(s.normal, to_eye))) * share >= 1.0 / 256.0;
 }
 
 // Pushes a ray that the gloss of a catcher reflects, if it can meet a virtual object.

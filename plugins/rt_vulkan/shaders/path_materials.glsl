@@ -6,8 +6,17 @@
 float specular_chance(Surface s, vec3 to_eye) {
     if (!s.is_rough)
         return 0.0;
-    float specular = luminance(schlick(s.specular, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
+    float specular = luminance(fresnel_of(s, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
     return diffuse > 0.0 ? clamp(specular / max(specular + diffuse, 1e-6), 0.1, 0.9) : 1.0;
+}
+
+// The chance that a lit surface scatters a ray by its clear coat.
+float coat_chance(Surface s, vec3 to_eye) {
+    if (!has_coat || !(s.coat > 0.0))
+        return 0.0;
+    float coat = 1.0 - below_coat(s, to_eye);
+    float below = (luminance(fresnel_of(s, dot(s.normal, to_eye))) + luminance(s.diffuse)) * (1.0 - coat);
+    return clamp(coat / max(coat + below, 1e-6), 0.1, 0.9);
 }
 
 // Returns the highlights of SPECULAR and METAL. Only light samples bring them; scattered rays do not follow this lobe.
@@ -19,9 +28,15 @@ vec3 highlight(Surface s, vec3 to_eye, vec3 to_light) {
 vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
     float cosine = lambert(s.normal, to_light);
     if (s.is_rough) {
-        vec3 half_vector = normalize(to_light + to_eye), fresnel = schlick(s.specular, dot(to_eye, half_vector));
+        vec3 half_vector = normalize(to_light + to_eye), fresnel = fresnel_of(s, dot(to_eye, half_vector));
         float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-        return s.diffuse * (vec3(1.0) - fresnel) * cosine + fresnel * lobe;
+        vec3 scattered = s.diffuse * (vec3(1.0) - fresnel) * cosine + fresnel * lobe;
+        if (has_coat && s.coat > 0.0)
+            scattered = scattered * below_coat(s, to_eye) +
+                        vec3(s.coat * coat_reflectance(dot(to_eye, half_vector)) *
+                             ggx_lobe(lambert(s.coat_normal, to_light), dot(s.coat_normal, to_eye),
+                                      dot(s.coat_normal, half_vector), s.coat_alpha));
+        return scattered;
     }
     return s.diffuse * cosine;
 }
@@ -29,18 +44,23 @@ vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
 // Returns the part of scattering() that the specular lobe of a rough surface reflects.
 vec3 gloss(Surface s, vec3 to_eye, vec3 to_light) {
     vec3 half_vector = normalize(to_light + to_eye);
-    return schlick(s.specular, dot(to_eye, half_vector)) *
+    return fresnel_of(s, dot(to_eye, half_vector)) *
            ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
 }
 
-// Density per steradian of the rays that a lit surface scatters. `chance`: result of specular_chance().
-float scattering_density(Surface s, vec3 to_eye, vec3 to_light, float chance) {
+// Density per steradian of the rays that a lit surface scatters. `chance`: result of specular_chance(); `by_coat`: of
+// coat_chance().
+float scattering_density(Surface s, vec3 to_eye, vec3 to_light, float chance, float by_coat) {
     if (!(dot(to_light, s.geometric_normal) > 0.0))
         return 0.0;
     float density = lambert(s.normal, to_light) * 0.318309886 * (1.0 - chance);
     if (s.is_rough)
         density += chance * ggx_reflection_density(dot(s.normal, to_eye),
                                                    dot(s.normal, normalize(to_light + to_eye)), s.alpha);
+    if (has_coat && by_coat > 0.0)
+        density += by_coat * (ggx_reflection_density(dot(s.coat_normal, to_eye),
+                                                     dot(s.coat_normal, normalize(to_light + to_eye)), s.coat_alpha) -
+                              density);
     return density;
 }
 
@@ -59,7 +79,7 @@ float mirror_chance_of(Surface s, vec3 direction, uint material, out vec3 reflec
 // reflected and of the refracted light pass by other microfacets.
 struct GlassScatter {
     float reflectance;
-    vec3 transmittance, reflected, refracted;
+    vec3 transmittance, reflected, refracted, reflection_tint, refraction_tint;
     float unmasked_reflected, unmasked_refracted;
 };
 
@@ -72,22 +92,31 @@ float unmasked(vec3 direction, vec3 normal, vec3 geometric_normal, float alpha) 
 
 // `uv`: random numbers that choose the microfacet of rough glass (Walter et al., Microfacet Models for Refraction,
 // EGSR 2007).
-GlassScatter scatter_at_glass(Surface s, vec3 direction, uint material, vec2 uv) {
-    float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
+// `is_rough`: whether the surface is treated as rough. The result has the tints of the material.
+GlassScatter scatter_at_glass(Surface s, vec3 direction, uint material, vec2 uv, bool is_rough) {
+    bool is_part = materials[material].model != GLASS, is_thin = is_part && materials[material].thin_walled != 0u;
+    bool from_inside = s.back_face && !is_thin;
+    float index = materials[material].index, ratio = from_inside ? index : 1.0 / index;
     GlassScatter glass;
-    glass.transmittance = s.back_face ? bouguer(materials[material].extinction, s.distance) : vec3(1.0);
+    glass.transmittance = from_inside ? bouguer(materials[material].extinction, s.distance) : vec3(1.0);
+    glass.reflection_tint = is_part ? vec3(1.0) : materials[material].reflectivity;
+    glass.refraction_tint = is_part ? s.transmitted : materials[material].refraction;
     Refraction refraction;
-    if (materials[material].roughness > 0.0) {
-        float alpha = ggx_alpha(materials[material].roughness);
+    if (is_rough) {
+        float alpha = is_part ? s.alpha : ggx_alpha(materials[material].roughness);
         vec3 facet = ggx_half_vector(s.normal, -direction, alpha, uv.x, uv.y);
         refraction = refraction_at(direction, facet, ratio);
         glass.reflected = mirror_direction(direction, facet);
+        if (is_thin)
+            refraction.direction = mirror_direction(glass.reflected, s.normal);
         // Sampling visible normals already accounts for the masking of `direction`.
         glass.unmasked_reflected = unmasked(glass.reflected, s.normal, s.geometric_normal, alpha);
         glass.unmasked_refracted = unmasked(refraction.direction, -s.normal, -s.geometric_normal, alpha);
     } else {
         refraction = refraction_of(s, direction, ratio);
         glass.reflected = reflected(s, direction);
+        if (is_thin)
+            refraction.direction = direction;
         glass.unmasked_reflected = glass.unmasked_refracted = 1.0;
     }
     glass.refracted = refraction.direction;

@@ -106,18 +106,21 @@ void trace_photon(uvec2 position) {
         travelled += s.distance;
         uint material = objects[hit.object].material;
         float choice = photon_pair(number, FIRST_BOUNCE_DIMENSION + bounce).x;
-        if (has_glass && materials[material].model == GLASS) {
+        bool is_glass = materials[material].model == GLASS, is_part = materials[material].transmission > 0.0;
+        if (materials[material].model == METAL || is_part)
+            add_material(s, hit, -ray.direction);
+        float transmission = is_glass ? 1.0 : s.transmission;
+        if (has_glass && choice < transmission) {
             vec2 uv = materials[material].roughness > 0.0 ? photon_pair(number, FIRST_FACET_DIMENSION + bounce) : vec2(0.0);
-            GlassScatter glass = scatter_at_glass(s, ray.direction, material, uv);
-            bool reflects = choice < glass.reflectance;
-            power *= glass.transmittance * (reflects ? materials[material].reflectivity * glass.unmasked_reflected
-                                                     : materials[material].refraction * glass.unmasked_refracted);
+            GlassScatter glass =
+                scatter_at_glass(s, ray.direction, material, uv, materials[material].roughness > 0.0);
+            bool reflects = choice < glass.reflectance * transmission;
+            power *= glass.transmittance * (reflects ? glass.reflection_tint * glass.unmasked_reflected
+                                                     : glass.refraction_tint * glass.unmasked_refracted);
             ray.origin = reflects ? above(s) : below(s);
             ray.direction = normalize(reflects ? glass.reflected : glass.refracted);
             continue;
         }
-        if (materials[material].model == METAL)
-            add_material(s, hit);
         vec3 reflectance;
         float chance = mirror_chance_of(s, ray.direction, material, reflectance);
         if (choice < chance) {
@@ -130,7 +133,7 @@ void trace_photon(uvec2 position) {
             break;
         if (emitted.grows)
             power *= travelled * travelled;
-        write_photon(photon, s.position, ray.direction, power * (1.0 / max(1.0 - chance, 1e-6)));
+        write_photon(photon, s.position, ray.direction, power * (1.0 / max((1.0 - chance) * (1.0 - transmission), 1e-6)));
         return;
     }
     write_photon(photon, vec3(0.0), vec3(0.0), vec3(-1.0)); // it arrived nowhere

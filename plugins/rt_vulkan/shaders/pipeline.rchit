@@ -10,5 +10,5 @@ layout(location = 0) rayPayloadInEXT Payload payload;
 hitAttributeEXT vec2 uv;
 
 void main() {
-    payload = Payload(gl_HitTEXT, uv, uint(gl_InstanceCustomIndexEXT), uint(gl_PrimitiveID));
+    payload = Payload(gl_HitTEXT, uv, uint(gl_InstanceCustomIndexEXT), uint(gl_PrimitiveID), 0u);
 }

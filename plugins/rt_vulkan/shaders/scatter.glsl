@@ -117,7 +117,7 @@ void scatter_rough(Path path, Surface s, vec3 to_eye, vec2 sample_uv) {
     float cosine = dot(direction, s.normal);
     // Sampling visible normals already accounts for the masking of `to_eye`.
     vec3 throughput =
-        path.throughput * schlick(s.specular, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha);
+        path.throughput * fresnel_of(s, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha);
     float density = ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
     if (cosine > 0.0 && dot(direction, s.geometric_normal) > 0.0 && largest(throughput) > min_throughput)
         push(path, above(s), direction, throughput, 1.0 / max(density, 1e-30));

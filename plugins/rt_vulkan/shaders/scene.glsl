@@ -7,7 +7,8 @@ const uint NONE = 0xffffffffu;
 #define INFINITY uintBitsToFloat(0x7f800000u)
 
 // The values of these constants are defined in arhost/scene.h.
-const uint DIFFUSE = 1u, SPECULAR = 2u, MIRROR = 3u, METAL = 4u, GLASS = 5u, METALLIC_ROUGHNESS = 6u;
+const uint DIFFUSE = 1u, SPECULAR = 2u, MIRROR = 3u, METAL = 4u, GLASS = 5u, METALLIC_ROUGHNESS = 6u,
+           UNLIT = 7u;
 const uint VIRTUAL = 1u, CATCHER = 2u, OCCLUDER = 3u;
 const uint DIRECTIONAL_LIGHT = 2u, SPOT_LIGHT = 3u, RECTANGLE_LIGHT = 4u, SPHERE_LIGHT = 5u;
 const uint FALLOFF_INVERSE_SQUARE = 2u;
@@ -17,13 +18,15 @@ const uint WRAP_CLAMP = 2u, WRAP_MIRROR = 3u;
 
 // Bits of Object.mask and Ray.mask. A ray can hit an object only if their masks have a common bit.
 const uint OPAQUE_MASK = 1u, GLASS_MASK = 2u, CATCHER_MASK = 4u, OCCLUDER_MASK = 8u, ALL_MASKS = 15u;
+// Bit of Ray.mask: the ray comes from the eye, and only mirrors and glass have scattered it.
+const uint OF_EYE = 16u;
 // Bits of Object.flags.
-const uint HAS_TRANSFORM = 1u, IS_SPHERES = 2u, HAS_HOLES = 4u;
+const uint HAS_TRANSFORM = 1u, IS_SPHERES = 2u, HAS_HOLES = 4u, HIDES_BACK_FACES = 8u, BLENDS = 16u;
 
 layout(constant_id = 0) const int stack_capacity = 1; // maximum number of pending rays per pixel
 layout(constant_id = 1) const bool has_glass = true;
 layout(constant_id = 2) const bool has_catchers = true;
-layout(constant_id = 3) const bool has_holes = true; // whether any object has holes
+layout(constant_id = 3) const bool has_holes = true; // whether any object rejects hits (layout.hpp)
 layout(constant_id = 4) const uint ray_dimensions = 2u;
 layout(constant_id = 5) const bool has_textures = true; // whether the scene has textures
 layout(constant_id = 6) const bool has_area_lights = true;
@@ -31,6 +34,7 @@ layout(constant_id = 7) const bool may_have_video = true; // whether any image h
 layout(constant_id = 8) const bool has_gloss = true; // path integrator: whether a catcher may mirror virtual objects
 layout(constant_id = 9) const bool has_photons = true;    // whether any image has caustics of lamps
 layout(constant_id = 10) const bool may_denoise = true;   // path integrator: whether any image is denoised
+layout(constant_id = 11) const bool has_coat = true;      // path integrator: whether any material has a clear coat
 
 struct Object {
     mat4x3 object_from_world;
@@ -42,6 +46,7 @@ struct Object {
     // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on a
     // ball; 0 if the object is not sampled as a light source.
     float emitter_density;
+    uint first_colour, vertex_count, unused, unused_2; // first_colour: in `indices`; NONE if absent
 };
 
 struct Material {
@@ -65,7 +70,11 @@ struct Material {
     float importance_cutoff;
     float fresnel_minimum, fresnel_maximum;
     uint reflection_depth, refraction_depth;
-    uint metallic_roughness_texture, normal_texture, emission_texture, unused;
+    uint metallic_roughness_texture, normal_texture, emission_texture, occlusion_texture;
+    float opacity, normal_scale, occlusion_strength, specular_weight;
+    uint specular_texture, specular_colour_texture, transmission_texture, thin_walled;
+    float transmission, clearcoat, clearcoat_roughness, clearcoat_normal_scale;
+    uint clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture, unused;
 };
 
 struct Light {
@@ -83,7 +92,10 @@ struct Light {
 
 struct Texture {
     uint format, first_texel, wrap_u, wrap_v; // first_texel: in 32-bit words
-    int width, height, unused, unused_2;
+    int width, height;
+    uint is_nearest, texcoord_set;
+    vec2 image_from_texcoord[3];
+    vec2 unused;
 };
 
 // A node of a BVH. Inner nodes have count 0; their children are the nodes `first` and first + 1. A leaf contains
@@ -188,7 +200,7 @@ layout(std430, set = 0, binding = 5) readonly buffer Primitives {
     Primitive primitives[];
 };
 layout(std430, set = 0, binding = 6) readonly buffer Indices {
-    uint indices[];
+    uint indices[]; // of triangles, and colours of vertices: two words each, 16 bits per channel
 };
 layout(std430, set = 0, binding = 7) readonly buffer Attributes {
     float attributes[]; // vertex normals and texture coordinates

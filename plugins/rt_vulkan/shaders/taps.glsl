@@ -38,7 +38,7 @@ bool is_edge(ivec2 pixel) {
 
 // Returns which light a ray through an edge pixel gets.
 uint tap_of(ivec2 pixel, vec3 direction) {
-    Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
+    Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK | OF_EYE);
     Hit hit;
     // Catchers do not hide the virtual objects behind them.
     for (;;) {
@@ -51,7 +51,7 @@ uint tap_of(ivec2 pixel, vec3 direction) {
     }
     if (hit.object == NONE || objects[hit.object].role == OCCLUDER)
         return NO_TAP;
-    uint surface = surface_of(hit.object), chosen = OWN_TAP;
+    uint surface = surface_of(hit), chosen = OWN_TAP;
     vec3 position = frame.eye + direction * hit.t;
     float least = 1e30;
     for (uint tap = 0u; tap < 9u; ++tap) {

@@ -37,12 +37,14 @@ float reduced(float t, uint wrap) {
     return bounded - 2.0 * floor(bounded * 0.5);
 }
 
-// Samples a texture with bilinear filtering.
+// Samples a texture with its filter.
 vec4 sample_texture(uint number, vec2 texcoord) {
     uint wrap_u = textures[number].wrap_u, wrap_v = textures[number].wrap_v;
     int width = textures[number].width, height = textures[number].height;
-    vec2 at = vec2(reduced(texcoord.x, wrap_u), reduced(texcoord.y, wrap_v)) * vec2(width, height) - 0.5;
-    vec2 corner = floor(at), weights = at - corner;
+    vec2 at = vec2(reduced(texcoord.x, wrap_u), reduced(texcoord.y, wrap_v)) * vec2(width, height);
+    bool is_nearest = textures[number].is_nearest != 0u;
+    at -= is_nearest ? 0.0 : 0.5;
+    vec2 corner = floor(at), weights = is_nearest ? vec2(0.0) : at - corner;
     int x0 = wrapped(int(corner.x), width, wrap_u), x1 = wrapped(int(corner.x) + 1, width, wrap_u);
     int y0 = wrapped(int(corner.y), height, wrap_v), y1 = wrapped(int(corner.y) + 1, height, wrap_v);
     vec4 a = texel_at(number, x0, y0), b = texel_at(number, x1, y0);

@@ -11,6 +11,7 @@ Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
     if (!can_hit(ray))
         return no_hit(ray);
     payload.object = 0u; // value if the closest-hit shader is skipped; any value but MISS reports a hit
+    payload.of_eye = ray.mask & OF_EYE;
     traceRayEXT(top_level,
                 (any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT) |
                     (cull_back_faces ? gl_RayFlagsNoOpaqueEXT : gl_RayFlagsNoneEXT),

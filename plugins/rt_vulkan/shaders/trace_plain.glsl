@@ -61,7 +61,8 @@ Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
                     continue;
                 if (cull_back_faces && dot(found.facet, direction) >= 0.0)
                     continue;
-                if (is_hole(object, i, found.uv))
+                if ((flags & IS_SPHERES) == 0u &&
+                    passes(object, i, found.uv, origin, direction, (ray.mask & OF_EYE) != 0u))
                     continue;
                 hit = found;
                 hit.object = object;

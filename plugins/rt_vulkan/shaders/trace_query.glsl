@@ -26,7 +26,8 @@ Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
                 !(cull_back_faces && dot(found.facet, direction) >= 0.0))
                 rayQueryGenerateIntersectionEXT(query, found.t);
         } else if (!(cull_back_faces && dot(facet_of(primitive), direction) >= 0.0) &&
-                   !is_hole(object, primitive, rayQueryGetIntersectionBarycentricsEXT(query, false))) {
+                   !passes(object, primitive, rayQueryGetIntersectionBarycentricsEXT(query, false), origin, direction,
+                           (ray.mask & OF_EYE) != 0u)) {
             rayQueryConfirmIntersectionEXT(query);
         }
     }

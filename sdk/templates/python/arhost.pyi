@@ -243,6 +243,7 @@ class Geometry:
     positions: Buffer
     normals: Buffer
     texcoords: Buffer
+    colours: Buffer
     indices: Buffer
     joints: Buffer
     weights: Buffer
@@ -251,24 +252,33 @@ class Geometry:
 TEXEL_SRGB8: int
 TEXEL_RGBA8: int
 TEXEL_RGBA32F: int
-WRAP_REPEAT: int
-WRAP_CLAMP: int
-WRAP_MIRROR: int
-TEXTURE: np.dtype[np.void]
-class Texture:
+TEXEL_IMAGE: np.dtype[np.void]
+class TexelImage:
     format: int
     width: int
     height: int
-    wrap_u: int
-    wrap_v: int
     name: int
     texels: Buffer
+WRAP_REPEAT: int
+WRAP_CLAMP: int
+WRAP_MIRROR: int
+TEXEL_FILTER_LINEAR: int
+TEXEL_FILTER_NEAREST: int
+TEXTURE: np.dtype[np.void]
+class Texture:
+    image: int
+    wrap_u: int
+    wrap_v: int
+    filter: int
+    texcoord_set: int
+    image_from_texcoord: np.ndarray
 MATERIAL_DIFFUSE: int
 MATERIAL_SPECULAR: int
 MATERIAL_MIRROR: int
 MATERIAL_METAL: int
 MATERIAL_GLASS: int
 MATERIAL_METALLIC_ROUGHNESS: int
+MATERIAL_UNLIT: int
 MATERIAL: np.dtype[np.void]
 class Material:
     model: int
@@ -279,12 +289,29 @@ class Material:
     exponent: float
     reflectivity: np.ndarray
     emission: np.ndarray
+    opacity: float
     alpha_cutoff: float
+    blends: int
     metallic: float
     roughness: float
     metallic_roughness_texture: int
     normal_texture: int
     emission_texture: int
+    normal_scale: float
+    occlusion_texture: int
+    occlusion_strength: float
+    specular_weight: float
+    specular_texture: int
+    specular_colour_texture: int
+    transmission: float
+    transmission_texture: int
+    thin_walled: int
+    clearcoat: float
+    clearcoat_roughness: float
+    clearcoat_texture: int
+    clearcoat_roughness_texture: int
+    clearcoat_normal_texture: int
+    clearcoat_normal_scale: float
     index: float
     fresnel_exponent: float
     fresnel_minimum: float
@@ -310,6 +337,8 @@ class Object:
     deforms: int
     node: int
     skin: int
+    hides_back_faces: int
+    reserved: int
 NODE: np.dtype[np.void]
 class Node:
     parent: int
@@ -331,7 +360,7 @@ class Channel:
     node: int
     target: int
     interpolation: int
-    reserved: int
+    period_s: float
     times: Buffer
     values: Buffer
 SKIN: np.dtype[np.void]
@@ -391,6 +420,7 @@ class Scene:
     reserved: int
     environment: Environment
     geometries: np.ndarray
+    images: Buffer
     textures: np.ndarray
     materials: np.ndarray
     objects: np.ndarray

@@ -270,7 +270,7 @@ STRUCT(arhost_tracker, 48,
 
 /* arhost/scene.h */
 VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);
-VALUE(ARHOST_SCENE_VERSION, 4);
+VALUE(ARHOST_SCENE_VERSION, 5);
 VALUE(ARHOST_NONE, 0xffffffff);
 
 STRUCT(arhost_buffer, 16,
@@ -280,44 +280,56 @@ VALUE(ARHOST_AXES_Y_UP, 2);
 VALUE(ARHOST_GEOMETRY_TRIANGLES, 1);
 VALUE(ARHOST_GEOMETRY_SPHERES, 2);
 
-STRUCT(arhost_geometry, 136,
+STRUCT(arhost_geometry, 152,
        FIELD(type, 0, 4) FIELD(reserved, 4, 4) FIELD(positions, 8, 16) FIELD(normals, 24, 16)
-       FIELD(texcoords, 40, 16) FIELD(indices, 56, 16) FIELD(joints, 72, 16) FIELD(weights, 88, 16)
-       FIELD(morph_positions, 104, 16) FIELD(morph_normals, 120, 16))
+       FIELD(texcoords, 40, 16) FIELD(colours, 56, 16) FIELD(indices, 72, 16) FIELD(joints, 88, 16)
+       FIELD(weights, 104, 16) FIELD(morph_positions, 120, 16) FIELD(morph_normals, 136, 16))
 VALUE(ARHOST_TEXEL_SRGB8, 1);
 VALUE(ARHOST_TEXEL_RGBA8, 2);
 VALUE(ARHOST_TEXEL_RGBA32F, 3);
+
+STRUCT(arhost_texel_image, 32,
+       FIELD(format, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(name, 12, 4) FIELD(texels, 16, 16))
 VALUE(ARHOST_WRAP_REPEAT, 1);
 VALUE(ARHOST_WRAP_CLAMP, 2);
 VALUE(ARHOST_WRAP_MIRROR, 3);
+VALUE(ARHOST_TEXEL_FILTER_LINEAR, 1);
+VALUE(ARHOST_TEXEL_FILTER_NEAREST, 2);
 
-STRUCT(arhost_texture, 40,
-       FIELD(format, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(wrap_u, 12, 4) FIELD(wrap_v, 16, 4)
-       FIELD(name, 20, 4) FIELD(texels, 24, 16))
+STRUCT(arhost_texture, 44,
+       FIELD(image, 0, 4) FIELD(wrap_u, 4, 4) FIELD(wrap_v, 8, 4) FIELD(filter, 12, 4) FIELD(texcoord_set, 16, 4)
+       FIELD(image_from_texcoord, 20, 24))
 VALUE(ARHOST_MATERIAL_DIFFUSE, 1);
 VALUE(ARHOST_MATERIAL_SPECULAR, 2);
 VALUE(ARHOST_MATERIAL_MIRROR, 3);
 VALUE(ARHOST_MATERIAL_METAL, 4);
 VALUE(ARHOST_MATERIAL_GLASS, 5);
 VALUE(ARHOST_MATERIAL_METALLIC_ROUGHNESS, 6);
+VALUE(ARHOST_MATERIAL_UNLIT, 7);
 
-STRUCT(arhost_material, 172,
+STRUCT(arhost_material, 240,
        FIELD(model, 0, 4) FIELD(colour_texture, 4, 4) FIELD(ambient, 8, 12) FIELD(diffuse, 20, 12)
        FIELD(specular, 32, 12) FIELD(exponent, 44, 4) FIELD(reflectivity, 48, 12) FIELD(emission, 60, 12)
-       FIELD(alpha_cutoff, 72, 4) FIELD(metallic, 76, 4) FIELD(roughness, 80, 4)
-       FIELD(metallic_roughness_texture, 84, 4) FIELD(normal_texture, 88, 4) FIELD(emission_texture, 92, 4)
-       FIELD(index, 96, 4) FIELD(fresnel_exponent, 100, 4) FIELD(fresnel_minimum, 104, 4)
-       FIELD(fresnel_maximum, 108, 4) FIELD(refraction, 112, 12) FIELD(extinction, 124, 12)
-       FIELD(shadow_attenuation, 136, 12) FIELD(cutoff_colour, 148, 12) FIELD(importance_cutoff, 160, 4)
-       FIELD(reflection_depth, 164, 4) FIELD(refraction_depth, 168, 4))
+       FIELD(opacity, 72, 4) FIELD(alpha_cutoff, 76, 4) FIELD(blends, 80, 4) FIELD(metallic, 84, 4)
+       FIELD(roughness, 88, 4) FIELD(metallic_roughness_texture, 92, 4) FIELD(normal_texture, 96, 4)
+       FIELD(emission_texture, 100, 4) FIELD(normal_scale, 104, 4) FIELD(occlusion_texture, 108, 4)
+       FIELD(occlusion_strength, 112, 4) FIELD(specular_weight, 116, 4) FIELD(specular_texture, 120, 4)
+       FIELD(specular_colour_texture, 124, 4) FIELD(transmission, 128, 4) FIELD(transmission_texture, 132, 4)
+       FIELD(thin_walled, 136, 4) FIELD(clearcoat, 140, 4) FIELD(clearcoat_roughness, 144, 4)
+       FIELD(clearcoat_texture, 148, 4) FIELD(clearcoat_roughness_texture, 152, 4)
+       FIELD(clearcoat_normal_texture, 156, 4) FIELD(clearcoat_normal_scale, 160, 4) FIELD(index, 164, 4)
+       FIELD(fresnel_exponent, 168, 4) FIELD(fresnel_minimum, 172, 4) FIELD(fresnel_maximum, 176, 4)
+       FIELD(refraction, 180, 12) FIELD(extinction, 192, 12) FIELD(shadow_attenuation, 204, 12)
+       FIELD(cutoff_colour, 216, 12) FIELD(importance_cutoff, 228, 4) FIELD(reflection_depth, 232, 4)
+       FIELD(refraction_depth, 236, 4))
 VALUE(ARHOST_ROLE_VIRTUAL, 1);
 VALUE(ARHOST_ROLE_CATCHER, 2);
 VALUE(ARHOST_ROLE_OCCLUDER, 3);
 
-STRUCT(arhost_object, 80,
+STRUCT(arhost_object, 88,
        FIELD(geometry, 0, 4) FIELD(material, 4, 4) FIELD(role, 8, 4) FIELD(name, 12, 4)
        FIELD(world_from_object, 16, 48) FIELD(moves, 64, 4) FIELD(deforms, 68, 4) FIELD(node, 72, 4)
-       FIELD(skin, 76, 4))
+       FIELD(skin, 76, 4) FIELD(hides_back_faces, 80, 4) FIELD(reserved, 84, 4))
 
 STRUCT(arhost_node, 112,
        FIELD(parent, 0, 4) FIELD(animated, 4, 4) FIELD(parent_from_node, 8, 48) FIELD(translation, 56, 12)
@@ -331,7 +343,7 @@ VALUE(ARHOST_INTERPOLATION_LINEAR, 2);
 VALUE(ARHOST_INTERPOLATION_CUBIC, 3);
 
 STRUCT(arhost_channel, 48,
-       FIELD(node, 0, 4) FIELD(target, 4, 4) FIELD(interpolation, 8, 4) FIELD(reserved, 12, 4) FIELD(times, 16, 16)
+       FIELD(node, 0, 4) FIELD(target, 4, 4) FIELD(interpolation, 8, 4) FIELD(period_s, 12, 4) FIELD(times, 16, 16)
        FIELD(values, 32, 16))
 
 STRUCT(arhost_skin, 32,
@@ -358,14 +370,14 @@ STRUCT(arhost_environment, 80,
 VALUE(ARHOST_INTEGRATOR_WHITTED, 1);
 VALUE(ARHOST_INTEGRATOR_PATH, 2);
 
-STRUCT(arhost_scene, 344,
+STRUCT(arhost_scene, 360,
        FIELD(magic, 0, 8) FIELD(version, 8, 4) FIELD(struct_size, 12, 4) FIELD(byte_size, 16, 8) FIELD(axes, 24, 4)
        FIELD(max_depth, 28, 4) FIELD(ambient, 32, 12) FIELD(background, 44, 12) FIELD(bounds_min, 56, 12)
        FIELD(bounds_max, 68, 12) FIELD(shadow_alpha_opaque, 80, 4) FIELD(shadow_alpha_translucent, 84, 4)
        FIELD(coloured_shadows, 88, 4) FIELD(duration_s, 92, 4) FIELD(integrator, 96, 4) FIELD(reserved, 100, 4)
-       FIELD(environment, 104, 80) FIELD(geometries, 184, 16) FIELD(textures, 200, 16) FIELD(materials, 216, 16)
-       FIELD(objects, 232, 16) FIELD(lights, 248, 16) FIELD(nodes, 264, 16) FIELD(channels, 280, 16)
-       FIELD(skins, 296, 16) FIELD(names, 312, 16) FIELD(anchors, 328, 16))
+       FIELD(environment, 104, 80) FIELD(geometries, 184, 16) FIELD(images, 200, 16) FIELD(textures, 216, 16)
+       FIELD(materials, 232, 16) FIELD(objects, 248, 16) FIELD(lights, 264, 16) FIELD(nodes, 280, 16)
+       FIELD(channels, 296, 16) FIELD(skins, 312, 16) FIELD(names, 328, 16) FIELD(anchors, 344, 16))
 
 /* arhost/motion.h */
 

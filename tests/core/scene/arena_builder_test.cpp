@@ -34,6 +34,7 @@ struct Parts {
     arhost_object *objects = all<arhost_object>(scene.objects);
     arhost_material *materials = all<arhost_material>(scene.materials);
     arhost_light *lights = all<arhost_light>(scene.lights);
+    arhost_texel_image *images = all<arhost_texel_image>(scene.images);
     arhost_texture *textures = all<arhost_texture>(scene.textures);
     arhost_node *nodes = all<arhost_node>(scene.nodes);
     arhost_channel *channels = all<arhost_channel>(scene.channels);
@@ -156,9 +157,9 @@ TEST(ArenaBuilder, WritesTexturesEnvironmentAndMotion) {
     const arhost_scene &scene = parts.scene;
     EXPECT_EQ(scene.byte_size, size);
     EXPECT_EQ(scene.textures.count, 2u);
-    EXPECT_EQ(parts.textures[0].height, 3u);
-    EXPECT_EQ(parts.all<std::uint8_t>(parts.textures[0].texels)[23], 200);
-    EXPECT_STREQ(parts.names + parts.textures[0].name, "wood.png");
+    EXPECT_EQ(parts.images[0].height, 3u);
+    EXPECT_EQ(parts.all<std::uint8_t>(parts.images[0].texels)[23], 200);
+    EXPECT_STREQ(parts.names + parts.images[0].name, "wood.png");
     EXPECT_EQ(parts.floats(scene.environment.columns)[2], 0.25f);
     EXPECT_EQ(scene.environment.environment_from_world[8], 1);
     EXPECT_EQ(scene.nodes.count, 4u);
@@ -187,7 +188,7 @@ TEST_P(Rejects, Field) {
 
 const Corruption faults_of_small_scene[] = {
     {"Magic", [](Parts a) { a.scene.magic ^= 1; }, "magic number"},
-    {"Version", [](Parts a) { a.scene.version = 1; }, "version is 1, not 4"},
+    {"Version", [](Parts a) { a.scene.version = 1; }, "version is 1, not 5"},
     {"StructSize", [](Parts a) { a.scene.struct_size += 8; }, "the struct_size of its header is wrong"},
     {"ByteSizeTooLarge", [](Parts a) { a.scene.byte_size += 64; }, "bytes, but"},
     {"ByteSizeHuge", [](Parts a) { a.scene.byte_size = ~0ull; }, "bytes, but"},
@@ -230,13 +231,18 @@ const Corruption faults_of_small_scene[] = {
      "object 0 'square': an element of world_from_object is nan"},
     {"ObjectTransformFlat", [](Parts a) { a.objects[0].world_from_object[4] = 0; },
      "world_from_object cannot be inverted"},
-    {"MaterialModel", [](Parts a) { a.materials[0].model = 7; }, "material 0: its model is unknown"},
+    {"MaterialModel", [](Parts a) { a.materials[0].model = 8; }, "material 0: its model is unknown"},
     {"MaterialTexture", [](Parts a) { a.materials[0].colour_texture = 0; }, "texture 0, but the scene has only 0"},
     {"MaterialIndex", [](Parts a) { a.materials[0].index = 0.5f; }, "index is 0.5, outside 1 to 4"},
     {"MaterialExtinction", [](Parts a) { a.materials[0].extinction[1] = -1; }, "extinction is -1"},
     {"MaterialFresnel", [](Parts a) { a.materials[0].fresnel_maximum = 0; }, "fresnel_maximum is 0"},
     {"MaterialEmission", [](Parts a) { a.materials[0].emission[2] = NAN; }, "emission is"},
     {"MaterialRoughness", [](Parts a) { a.materials[0].roughness = 2; }, "roughness is 2"},
+    {"MaterialOpacity", [](Parts a) { a.materials[0].opacity = 1.5f; }, "opacity is 1.5"},
+    {"MaterialTransmission", [](Parts a) { a.materials[0].transmission = 2; }, "transmission is 2"},
+    {"MaterialClearcoat", [](Parts a) { a.materials[0].clearcoat = -1; }, "clearcoat is -1"},
+    {"MaterialNormalScale", [](Parts a) { a.materials[0].normal_scale = INFINITY; }, "normal_scale is inf"},
+    {"ObjectReserved", [](Parts a) { a.objects[1].reserved = 1; }, "object 1 'ball': a reserved field is not 0"},
     {"MaterialAmbient", [](Parts a) { a.materials[0].ambient[0] = 2; }, "material 0: ambient is 2, outside 0 to 1"},
     {"MaterialDiffuse", [](Parts a) { a.materials[0].diffuse[0] = -0.1f; }, "diffuse is -0.1"},
     {"MaterialSpecular", [](Parts a) { a.materials[0].specular[2] = NAN; }, "specular is nan"},
@@ -273,6 +279,11 @@ const Corruption faults_of_geometry[] = {
      "the buffer of positions extends past the end"},
     {"NormalsCount", [](Parts a) { a.geometries[0].normals.count = 3; }, "it has 3 normals for 4 vertices"},
     {"TexcoordsCount", [](Parts a) { a.geometries[0].texcoords.count = 3; }, "it has 3 texcoords for 4 vertices"},
+    {"ColoursCount",
+     [](Parts a) {
+         a.geometries[0].colours = {a.geometries[0].normals.offset, 3, 8};
+     },
+     "it has 3 colours for 4 vertices"},
     {"NoTriangles", [](Parts a) { a.geometries[0].indices = {}; },
      "geometry 0 (object 0 'square'): it has no triangles"},
     {"NoVertices",
@@ -294,7 +305,7 @@ const Corruption faults_of_geometry[] = {
      [](Parts a) {
          a.geometries[1].indices = arhost_buffer{0, 0, 12};
      },
-     "spheres cannot have normals, texcoords, indices"},
+     "spheres cannot have normals, texcoords, colours, indices"},
     {"PositionsOverHeader", [](Parts a) { a.geometries[0].positions.offset = 0; }, "overlaps the header"},
     {"NoSpheres", [](Parts a) { a.geometries[1].positions = {}; }, "it has no spheres"},
 };
@@ -336,24 +347,29 @@ TEST_P(RejectsInFullScene, Field) {
 }
 
 const Corruption faults_of_textures[] = {
-    {"Format", [](Parts a) { a.textures[0].format = 4; }, "texture 0: its format is unknown"},
-    {"FormatOfOtherSize", [](Parts a) { a.textures[0].format = ARHOST_TEXEL_RGBA32F; },
-     "texture 0: the buffer of texels has a stride of 4 bytes, not 16"},
+    {"Format", [](Parts a) { a.images[0].format = 4; }, "image 0: its format is unknown"},
+    {"FormatOfOtherSize", [](Parts a) { a.images[0].format = ARHOST_TEXEL_RGBA32F; },
+     "image 0: the buffer of texels has a stride of 4 bytes, not 16"},
+    {"Image", [](Parts a) { a.textures[0].image = 2; }, "texture 0: it refers to image 2, but the scene has only 2"},
+    {"Filter", [](Parts a) { a.textures[0].filter = 3; }, "texture 0: its filter is unknown"},
+    {"Transform", [](Parts a) { a.textures[0].image_from_texcoord[5] = NAN; }, "image_from_texcoord is nan"},
+    {"TexcoordSet", [](Parts a) { a.textures[0].texcoord_set = 1; },
+     "object 0 'square' has a material with a texture of texcoord set 1, but its geometry has no such set"},
     {"WrapU", [](Parts a) { a.textures[0].wrap_u = 0; }, "its wrap mode is unknown"},
     {"WrapV", [](Parts a) { a.textures[1].wrap_v = 4; }, "texture 1: its wrap mode"},
-    {"Name", [](Parts a) { a.textures[1].name = a.scene.names.count; }, "outside the table of names"},
-    {"Width", [](Parts a) { a.textures[0].width = 0; }, "has 0 x 3 texels; each side must have 1 to 16384"},
-    {"Height", [](Parts a) { a.textures[0].height = 16385; }, "2 x 16385 texels"},
-    {"TexelCount", [](Parts a) { a.textures[0].height = 2; }, "has 6 texels for 2 x 2"},
-    {"TexelNotANumber", [](Parts a) { a.floats(a.textures[1].texels)[5] = NAN; },
-     "texture 1: texel 1 has the invalid value nan"},
-    {"TexelBelowZero", [](Parts a) { a.floats(a.textures[1].texels)[15] = -1; }, "texel 3 has the invalid value -1"},
-    {"TexelTooBright", [](Parts a) { a.floats(a.textures[1].texels)[0] = 1.1e6f; },
+    {"Name", [](Parts a) { a.images[1].name = a.scene.names.count; }, "outside the table of names"},
+    {"Width", [](Parts a) { a.images[0].width = 0; }, "has 0 x 3 texels; each side must have 1 to 16384"},
+    {"Height", [](Parts a) { a.images[0].height = 16385; }, "2 x 16385 texels"},
+    {"TexelCount", [](Parts a) { a.images[0].height = 2; }, "has 6 texels for 2 x 2"},
+    {"TexelNotANumber", [](Parts a) { a.floats(a.images[1].texels)[5] = NAN; },
+     "image 1: texel 1 has the invalid value nan"},
+    {"TexelBelowZero", [](Parts a) { a.floats(a.images[1].texels)[15] = -1; }, "texel 3 has the invalid value -1"},
+    {"TexelTooBright", [](Parts a) { a.floats(a.images[1].texels)[0] = 1.1e6f; },
      "texel 0 has the invalid value 1.1e+06"},
     {"MaterialsTexture", [](Parts a) { a.materials[0].normal_texture = 2; },
      "material 0: it refers to texture 2, but the scene has only 2"},
     {"TextureWithoutTexcoords", [](Parts a) { a.objects[1].material = 0; },
-     "object 1 'ball' has a textured material, but its geometry has no texcoords"},
+     "object 1 'ball' has a material with a texture of texcoord set 0, but its geometry has no such set"},
     {"Environment", [](Parts a) { a.scene.environment.texture = 2; },
      "the environment refers to texture 2, but the scene has only 2"},
     {"EnvironmentOfBytes", [](Parts a) { a.scene.environment.texture = 0; }, "is not RGBA32F"},
@@ -448,7 +464,7 @@ const Corruption faults_of_motion[] = {
     {"ChannelNodeNotAnimated", [](Parts a) { a.channels[0].node = 1; }, "its node is not animated"},
     {"ChannelTarget", [](Parts a) { a.channels[0].target = 5; }, "its target is unknown"},
     {"ChannelInterpolation", [](Parts a) { a.channels[0].interpolation = 0; }, "its interpolation is unknown"},
-    {"ChannelReserved", [](Parts a) { a.channels[0].reserved = 1; }, "a reserved field is not 0"},
+    {"ChannelPeriod", [](Parts a) { a.channels[0].period_s = -1; }, "period_s is -1"},
     {"ChannelWithoutKeys", [](Parts a) { a.channels[2].times = a.channels[2].values = {}; },
      "channel 2: it has no keys"},
     {"ChannelTimes", [](Parts a) { a.floats(a.channels[0].times)[1] = 0; }, "its times are not strictly increasing"},

@@ -65,8 +65,8 @@ TEST(Capabilities, IgnoreMaterialsThatNoObjectUses) {
     EXPECT_EQ(needed(std::move(builder)), 0u);
 }
 
-Texture texel(arhost_texel_format format, std::size_t size) {
-    Texture texture{.format = format, .width = 1, .height = 1, .texels = Texels::of_size(size)};
+TexelImage texel(arhost_texel_format format, std::size_t size) {
+    TexelImage texture{.format = format, .width = 1, .height = 1, .texels = Texels::of_size(size)};
     std::ranges::fill(texture.texels.span(), std::byte{0});
     return texture;
 }

@@ -44,12 +44,12 @@ private:
 };
 
 std::vector<int> bytes(const Arena &a, std::size_t i = 0) {
-    const auto *p = elements<std::uint8_t>(a, texture(a, i).texels);
-    return {p, p + 4 * texture(a, i).texels.count};
+    const auto *p = elements<std::uint8_t>(a, image(a, i).texels);
+    return {p, p + 4 * image(a, i).texels.count};
 }
 std::vector<float> floats(const Arena &a, std::size_t i = 0) {
-    const auto *p = elements<float>(a, texture(a, i).texels);
-    return {p, p + 4 * texture(a, i).texels.count};
+    const auto *p = elements<float>(a, image(a, i).texels);
+    return {p, p + 4 * image(a, i).texels.count};
 }
 
 } // namespace
@@ -57,9 +57,9 @@ std::vector<float> floats(const Arena &a, std::size_t i = 0) {
 TEST(Textures, PngsHaveTheTopRowFirstAndStraightAlpha) {
     const Arena arena = Scene("a.png", png(1, 2, 4, {10, 20, 30, 40, 50, 60, 70, 80})).load_texture("a.png");
     ASSERT_EQ(arena.scene().textures.count, 1u);
-    EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_SRGB8);
-    EXPECT_EQ(texture(arena).width, 1u);
-    EXPECT_EQ(texture(arena).height, 2u);
+    EXPECT_EQ(image(arena).format, ARHOST_TEXEL_SRGB8);
+    EXPECT_EQ(image(arena).width, 1u);
+    EXPECT_EQ(image(arena).height, 2u);
     EXPECT_EQ(texture(arena).wrap_u, ARHOST_WRAP_REPEAT);
     EXPECT_THAT(bytes(arena), ElementsAre(10, 20, 30, 40, 50, 60, 70, 80));
     EXPECT_EQ(material(arena).colour_texture, 0u);
@@ -81,8 +81,8 @@ TEST(Textures, AreExpandedToRgba) {
 
 TEST(Textures, FloatsAreLinearAndClamped) {
     const Arena radiance = Scene("a.hdr", hdr(1, 2, {'\x80', 64, 32, '\x81', 1, 2, 4, '\x88'})).load_texture("a.hdr");
-    EXPECT_EQ(texture(radiance).format, ARHOST_TEXEL_RGBA32F);
-    EXPECT_EQ(texture(radiance).height, 2u);
+    EXPECT_EQ(image(radiance).format, ARHOST_TEXEL_RGBA32F);
+    EXPECT_EQ(image(radiance).height, 2u);
     const std::vector<float> texels = floats(radiance);
     EXPECT_NEAR(texels[0], 1, 0.01);
     EXPECT_NEAR(texels[1], 0.5, 0.01);
@@ -101,7 +101,7 @@ TEST(Textures, FloatsAreLinearAndClamped) {
 TEST(Textures, HaveWrapModeAndEncoding) {
     const Arena arena =
         Scene("a.png", png(1, 1, 1, {7})).load_texture("{image: a.png, wrap: mirror, encoding: linear}");
-    EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_RGBA8);
+    EXPECT_EQ(image(arena).format, ARHOST_TEXEL_RGBA8);
     EXPECT_EQ(texture(arena).wrap_u, ARHOST_WRAP_MIRROR);
     EXPECT_EQ(texture(arena).wrap_v, ARHOST_WRAP_MIRROR);
 }
@@ -118,7 +118,7 @@ TEST(Textures, TheSameFileIsStoredOnce) {
     EXPECT_EQ(material(arena).metallic_roughness_texture, 1u);
     EXPECT_EQ(material(arena).normal_texture, 2u);
     EXPECT_THAT(material(arena).emission, testing::Each(1.0f));
-    EXPECT_EQ(texture(arena, 1).format, ARHOST_TEXEL_RGBA8);
+    EXPECT_EQ(image(arena, 1).format, ARHOST_TEXEL_RGBA8);
     EXPECT_EQ(texture(arena, 2).wrap_u, ARHOST_WRAP_CLAMP);
 }
 
@@ -191,7 +191,7 @@ TEST(Environments, HaveCumulativeSums) {
     const arhost_environment &environment = arena.scene().environment;
     EXPECT_EQ(environment.texture, 0u);
     EXPECT_EQ(environment.intensity, 3);
-    EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_RGBA32F);
+    EXPECT_EQ(image(arena).format, ARHOST_TEXEL_RGBA32F);
     EXPECT_THAT(floats(arena), ElementsAre(1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1));
     const auto *rows = elements<float>(arena, environment.rows),
                *columns = elements<float>(arena, environment.columns);

@@ -122,16 +122,15 @@ TEST(SceneFile, HasDefaultLightThatFollowsTheVideo) {
     EXPECT_THAT(std::span(environment.environment_from_world + 6, 3),
                 ElementsAre(FloatNear(0, 1e-6f), FloatNear(1, 1e-6f), FloatNear(0, 1e-6f)))
         << "z is up";
-    const auto &texture = elements<arhost_texture>(arena, arena.scene().textures)[environment.texture];
-    const auto texels = elements<glm::vec4>(arena, texture.texels);
+    const arhost_texel_image &sky = image(arena);
+    const auto texels = elements<glm::vec4>(arena, sky.texels);
     double irradiance = 0; // of a horizontal surface, divided by π
-    for (std::uint32_t row = 0; row < texture.height / 2; ++row) {
-        const double begin = std::numbers::pi * row / texture.height,
-                     end = std::numbers::pi * (row + 1) / texture.height;
+    for (std::uint32_t row = 0; row < sky.height / 2; ++row) {
+        const double begin = std::numbers::pi * row / sky.height, end = std::numbers::pi * (row + 1) / sky.height;
         irradiance += (std::pow(std::sin(end), 2) - std::pow(std::sin(begin), 2)) * double{texels[row].x};
     }
     EXPECT_NEAR(0.35 * irradiance, 1, 0.02) << "a surface of reflectance 0.35 has the radiance of the video";
-    EXPECT_NEAR(texels[texture.height - 1].x, 1, 1e-6) << "below";
+    EXPECT_NEAR(texels[sky.height - 1].x, 1, 1e-6) << "below";
 }
 
 TEST(SceneFile, HasNoDefaultLightIfItDescribesLight) {

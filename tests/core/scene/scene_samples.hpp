@@ -44,17 +44,17 @@ inline ArenaBuilder small_scene() {
     return builder;
 }
 
-// Returns a texture with a uniform colour.
-inline Texture plain_texture(arhost_texel_format format, std::uint32_t width, std::uint32_t height) {
-    Texture texture{format, width, height, ARHOST_WRAP_REPEAT, ARHOST_WRAP_CLAMP, {}};
+// Returns an image with a uniform colour.
+inline TexelImage plain_image(arhost_texel_format format, std::uint32_t width, std::uint32_t height) {
+    TexelImage image{format, width, height, {}};
     if (format == ARHOST_TEXEL_RGBA32F) {
-        texture.texels = Texels::of_size(std::size_t(width) * height * 16);
-        std::ranges::fill(std::span(reinterpret_cast<float *>(texture.texels.bytes.get()), 4 * width * height), 0.5f);
+        image.texels = Texels::of_size(std::size_t(width) * height * 16);
+        std::ranges::fill(std::span(reinterpret_cast<float *>(image.texels.bytes.get()), 4 * width * height), 0.5f);
     } else {
-        texture.texels = Texels::of_size(std::size_t(width) * height * 4);
-        std::ranges::fill(texture.texels.span(), std::byte(200));
+        image.texels = Texels::of_size(std::size_t(width) * height * 4);
+        std::ranges::fill(image.texels.span(), std::byte(200));
     }
-    return texture;
+    return image;
 }
 
 // Returns the square with its left side bound to joint 0, its right side bound to joint 1, and a morph target that
@@ -75,8 +75,10 @@ inline ArenaBuilder full_scene() {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
     arhost_material textured = make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
-    textured.colour_texture = builder.add_texture("wood.png", plain_texture(ARHOST_TEXEL_SRGB8, 2, 3));
-    builder.environment.texture = builder.add_texture("sky.hdr", plain_texture(ARHOST_TEXEL_RGBA32F, 2, 2));
+    textured.colour_texture =
+        builder.add_texture("wood.png", plain_image(ARHOST_TEXEL_SRGB8, 2, 3), {.wrap_v = ARHOST_WRAP_CLAMP});
+    builder.environment.texture =
+        builder.add_texture("sky.hdr", plain_image(ARHOST_TEXEL_RGBA32F, 2, 2), {.wrap_v = ARHOST_WRAP_CLAMP});
     builder.environment.rows = {0.5f, 1};
     builder.environment.columns = {0.5f, 1, 0.25f, 1};
     const std::uint32_t material = builder.add_material(textured), plain = builder.add_material(grey());
@@ -118,6 +120,9 @@ inline const arhost_object &object(const Arena &a, std::size_t i = 0) {
 }
 inline const arhost_geometry &geometry(const Arena &a, std::size_t i = 0) {
     return elements<arhost_geometry>(a, a.scene().geometries)[i];
+}
+inline const arhost_texel_image &image(const Arena &a, std::size_t i = 0) {
+    return elements<arhost_texel_image>(a, a.scene().images)[i];
 }
 inline const arhost_texture &texture(const Arena &a, std::size_t i = 0) {
     return elements<arhost_texture>(a, a.scene().textures)[i];

@@ -56,6 +56,7 @@ TEST(Schlick, RisesFromNormalReflectanceToOneAtGrazingIncidence) {
     expect_near(schlick(metal, 0), {1, 1, 1}, 0);
     expect_near(schlick(metal, 0.5), {0.04 + 0.96 / 32, 0.5 + 0.5 / 32, 1}, 1e-15); // eq. 15
     expect_near(schlick(metal, 1.5), metal, 0);
+    expect_near(schlick_between(metal, 0.25, 0), {0.25, 0.25, 0.25}, 0);
     expect_near(schlick(metal, -0.5), {1, 1, 1}, 0);
 }
 
@@ -122,9 +123,11 @@ TEST(InterpolatedNormals, ReflectNoRayIntoTheFacet) {
 
 TEST(MetallicRoughness, MetalsReflectTheirColourAndDielectricsFourPercent) {
     const Vec3 base{0.5, 0.25, 1};
-    expect_near(metallic_reflectance(base, 0), {0.04, 0.04, 0.04}, 0);
-    expect_near(metallic_reflectance(base, 1), base, 0);
-    expect_near(metallic_reflectance(base, 0.25), {0.03 + 0.125, 0.03 + 0.0625, 0.28}, 1e-15);
+    const Vec3 dielectric{0.04, 0.04, 0.04};
+    EXPECT_NEAR(normal_reflectance(1.5), 0.04, 1e-15);
+    expect_near(metallic_reflectance(dielectric, base, 0), dielectric, 0);
+    expect_near(metallic_reflectance(dielectric, base, 1), base, 0);
+    expect_near(metallic_reflectance(dielectric, base, 0.25), {0.03 + 0.125, 0.03 + 0.0625, 0.28}, 1e-15);
     expect_near(metallic_diffuse(base, 0), base, 0);
     expect_near(metallic_diffuse(base, 1), {0, 0, 0}, 0);
     EXPECT_EQ(ggx_alpha(0.5), 0.25);

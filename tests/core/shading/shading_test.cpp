@@ -293,7 +293,7 @@ TEST(Surface, TangentsPointAlongIncreasingTextureCoordinates) {
 TEST(Surface, NormalMapRedTiltsAlongUAndGreenAgainstV) {
     const Vec3 u{2, 0, 0.5}, v{0, 3, 0}; // u is not orthogonal to the normal
     const auto is = [&](Vec3 texel, Vec3 expected) {
-        const Vec3 mapped = perturbed_normal(up, up, u, v, texel);
+        const Vec3 mapped = perturbed_normal(up, up, u, v, texel, 1);
         EXPECT_NEAR(length(normalize(mapped) - expected), 0, 1e-12);
     };
     is({0.5, 0.5, 1}, up);
@@ -301,9 +301,9 @@ TEST(Surface, NormalMapRedTiltsAlongUAndGreenAgainstV) {
     is({0.5, 0.8, 0.9}, {0, -0.6, 0.8});
     is({0.5, 0.2, 0.9}, {0, 0.6, 0.8});
     const auto stays = [&](Vec3 normal) { EXPECT_EQ(length(normal - up), 0); };
-    stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // the result would point into the surface
-    stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // u is parallel to the normal
-    is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the sign of `facet` does not matter
+    stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}, 1));      // the result would point into the surface
+    stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}, 1)); // u is parallel to the normal
+    is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9}, 1)); // the sign of `facet` does not matter
 }
 
 TEST(Colour, RadianceIsBoundedFarAboveWhite) {

@@ -58,9 +58,8 @@ TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
     if (available_gib() < 4)
         GTEST_SKIP() << "needs 4 GiB of memory";
     constexpr std::uint32_t side = 16384;
-    scene::Texture texture;
+    scene::TexelImage texture;
     texture.width = texture.height = side;
-    texture.wrap_u = texture.wrap_v = ARHOST_WRAP_CLAMP;
     texture.format = ARHOST_TEXEL_RGBA8;
     texture.texels.size = std::size_t{4} * side * side;
     texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size); // black, alpha 0
@@ -69,7 +68,8 @@ TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
         std::memset(texture.texels.bytes.get() + 4 * (y * side + 3 * side / 4), 0xff, side);
     SceneBuilder builder({.ambient = glm::vec3(1)});
     arhost_material material = flat(1, 1, 1);
-    material.colour_texture = builder.add_texture("map", std::move(texture));
+    material.colour_texture =
+        builder.add_texture("map", std::move(texture), {.wrap_u = ARHOST_WRAP_CLAMP, .wrap_v = ARHOST_WRAP_CLAMP});
     builder.add_mesh("sheet", textured_square(50, 0), material);
     const Picture picture = Tracer(std::move(builder)).render(from_above());
     EXPECT_EQ(picture.at(140, 120)[0], 255) << "the white area is at the bottom right";

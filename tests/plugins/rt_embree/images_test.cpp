@@ -16,12 +16,11 @@ namespace {
 // blue and grey.
 Picture of_four_texels(arhost_wrap wrap, float repeats, arhost_texel_format format = ARHOST_TEXEL_SRGB8) {
     SceneBuilder builder({.ambient = glm::vec3(1)});
-    scene::Texture texture =
+    scene::TexelImage texture =
         texture_of(2, 2, {{255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 255, 255}, {188, 188, 188, 255}});
-    texture.wrap_u = texture.wrap_v = wrap;
     texture.format = format;
     arhost_material material = flat(1, 1, 1);
-    material.colour_texture = builder.add_texture("four", std::move(texture));
+    material.colour_texture = builder.add_texture("four", std::move(texture), {.wrap_u = wrap, .wrap_v = wrap});
     scene::TriangleMesh mesh = square(60);
     const float n = repeats;
     mesh.texcoords = {{0, n}, {n, n}, {n, 0}, {0, 0}};

@@ -749,11 +749,10 @@ struct OddScene {
 void add_sky(SceneBuilder &scene, std::uint32_t width, std::uint32_t height, float radiance, float sun) {
     std::vector<glm::vec4> texels(std::size_t{width} * height, glm::vec4(glm::vec3(radiance), 1));
     texels[0] = glm::vec4(glm::vec3(sun), 1);
-    scene::Texture texture = float_texture_of(width, height, texels);
-    texture.wrap_v = ARHOST_WRAP_CLAMP;
+    scene::TexelImage texture = float_texture_of(width, height, texels);
     scene::Environment environment;
     scene::add_cumulative_sums(environment, texture, scene::Reporter({}, "sky"));
-    environment.texture = scene.add_texture("sky", std::move(texture));
+    environment.texture = scene.add_texture("sky", std::move(texture), {.wrap_v = ARHOST_WRAP_CLAMP});
     scene.environment = std::move(environment);
     scene.add_ball("ball", {0, 0, 20, 20}, glass_of());
     scene.add_ball("metal", {50, 0, 20, 20}, metallic_roughness({1, 1, 1}, 1, 0));

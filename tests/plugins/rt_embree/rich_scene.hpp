@@ -8,8 +8,8 @@
 
 namespace arhost::test {
 
-inline scene::Texture texture_of(std::uint32_t width, std::uint32_t height, const std::vector<Pixel> &pixels) {
-    scene::Texture texture;
+inline scene::TexelImage texture_of(std::uint32_t width, std::uint32_t height, const std::vector<Pixel> &pixels) {
+    scene::TexelImage texture;
     texture.width = width;
     texture.height = height;
     texture.texels.size = 4 * pixels.size();
@@ -20,10 +20,10 @@ inline scene::Texture texture_of(std::uint32_t width, std::uint32_t height, cons
     return texture;
 }
 
-// Returns a texture of floating-point texels.
-inline scene::Texture float_texture_of(std::uint32_t width, std::uint32_t height,
-                                       const std::vector<glm::vec4> &texels) {
-    scene::Texture texture;
+// Returns an image of floating-point texels.
+inline scene::TexelImage float_texture_of(std::uint32_t width, std::uint32_t height,
+                                          const std::vector<glm::vec4> &texels) {
+    scene::TexelImage texture;
     texture.format = ARHOST_TEXEL_RGBA32F;
     texture.width = width;
     texture.height = height;
@@ -38,21 +38,20 @@ template <class Colour> void add_environment(SceneBuilder &builder, Colour colou
     std::vector<glm::vec4> texels;
     for (std::uint32_t i = 0; i < 8 * 4; ++i)
         texels.emplace_back(colour(i % 8), 1);
-    scene::Texture texture = float_texture_of(8, 4, texels);
-    texture.wrap_v = ARHOST_WRAP_CLAMP;
+    scene::TexelImage texture = float_texture_of(8, 4, texels);
     scene::Environment environment;
     scene::add_cumulative_sums(environment, texture, scene::Reporter({}, "sky"));
-    environment.texture = builder.add_texture("sky", std::move(texture));
+    environment.texture = builder.add_texture("sky", std::move(texture), {.wrap_v = ARHOST_WRAP_CLAMP});
     environment.environment_from_world = glm::mat3(1, 0, 0, 0, 0, -1, 0, 1, 0); // the map's up direction is world +z
     builder.environment = std::move(environment);
 }
 
 // Returns a material whose texture is opaque on the left half and transparent on the right half.
 inline arhost_material half_a_hole(SceneBuilder &builder, float cutoff) {
-    scene::Texture texture = texture_of(2, 1, {{255, 255, 255, 255}, {255, 255, 255, 0}});
-    texture.wrap_u = texture.wrap_v = ARHOST_WRAP_CLAMP;
+    scene::TexelImage texture = texture_of(2, 1, {{255, 255, 255, 255}, {255, 255, 255, 0}});
     arhost_material material = flat(1, 1, 1);
-    material.colour_texture = builder.add_texture("half", std::move(texture));
+    material.colour_texture =
+        builder.add_texture("half", std::move(texture), {.wrap_u = ARHOST_WRAP_CLAMP, .wrap_v = ARHOST_WRAP_CLAMP});
     material.alpha_cutoff = cutoff;
     return material;
 }

@@ -82,6 +82,63 @@ SceneBuilder balls_in_an_environment() {
     return builder;
 }
 
+// Squares over a floor: translucent, coated, of thin and solid glass, unlit, with hidden back faces, and textured
+// with vertex colours.
+SceneBuilder squares_of_all_materials() {
+    SceneBuilder builder(path_settings(glm::vec3(0.6f, 0.5f, 0.4f), 6));
+    builder.add_mesh("floor", square(90), diffuse(0.5f, 0.6f, 0.4f));
+    builder.add_light(placed(ARHOST_LIGHT_POINT, {30, -40, 120}, 9000, ARHOST_FALLOFF_INVERSE_SQUARE));
+    int count = 0;
+    const auto add = [&](const arhost_material &material, scene::TriangleMesh mesh = square(14), bool hides = false) {
+        const glm::vec3 position(-60 + 40 * (count % 4), 30 - 55 * (count / 4), 12);
+        mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}, /* set 1 */ {0, 2}, {2, 2}, {2, 0}, {0, 0}};
+        builder.add_object("square " + std::to_string(count++),
+                           builder.add_triangles(moved(std::move(mesh), position)), builder.add_material(material),
+                           ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {}, hides);
+    };
+    const scene::Texture turned{.texcoord_set = 1, .image_from_texcoord = {{0, 0.5f}, {-1, 0}, {0.25f, 0}}};
+    arhost_material material = metallic_roughness({0.9f, 0.3f, 0.2f}, 0, 0.6f);
+    material.opacity = 0.6f;
+    material.blends = 1;
+    add(material);
+    material = metallic_roughness({0.2f, 0.3f, 0.8f}, 0, 0.7f);
+    material.clearcoat = 0.8f;
+    material.clearcoat_roughness = 0.3f;
+    add(material);
+    material = metallic_roughness({0.9f, 0.8f, 0.3f}, 0.1f, 0.4f);
+    material.transmission = 0.7f;
+    material.thin_walled = 1;
+    add(material);
+    material.thin_walled = 0;
+    material.roughness = 0.2f;
+    set3(material.extinction, 0.01f, 0.05f, 0.02f);
+    builder.add_mesh("solid", moved(cube(12), {60, 30, 14}), material);
+    ++count;
+    material = scene::make_material(ARHOST_MATERIAL_UNLIT);
+    set3(material.diffuse, 0.2f, 0.7f, 0.3f);
+    add(material);
+    scene::TriangleMesh back = square(14);
+    for (glm::uvec3 &t : back.triangles)
+        std::swap(t.y, t.z);
+    add(diffuse(0.8f, 0.8f, 0.8f), back, true);
+    material = metallic_roughness({1, 1, 1}, 0, 0.5f);
+    material.index = 2;
+    set3(material.specular, 1, 0.5f, 0.2f);
+    material.specular_weight = 0.9f;
+    material.colour_texture = builder.add_texture(
+        "colours", texture_of(2, 2, {{255, 0, 0, 255}, {0, 255, 0, 128}, {0, 0, 255, 0}, {255, 255, 255, 255}}),
+        turned);
+    material.blends = 1;
+    scene::TriangleMesh coloured = square(14);
+    coloured.colours = {
+        {65535, 0, 0, 65535}, {0, 65535, 0, 65535}, {0, 0, 65535, 30000}, {65535, 65535, 65535, 65535}};
+    add(material, coloured);
+    material.blends = 0;
+    material.alpha_cutoff = 0.4f;
+    add(material, coloured);
+    return builder;
+}
+
 // A desk with a ball that shadows and colours it, one that shines onto it, and an occluder in front.
 SceneBuilder desk(const arhost_material &of_ball, const arhost_material &of_desk = diffuse(0.6f, 0.6f, 0.6f)) {
     SceneBuilder builder(path_settings(glm::vec3(0.4f)));
@@ -216,6 +273,10 @@ TEST_F(PathIntegrator, LightsABoxAsRtEmbreeDoes) {
 
 TEST_F(PathIntegrator, ScattersLightInGlassAndMetalAsRtEmbreeDoes) {
     expect_rt_embrees_picture(&balls_in_an_environment, from_the_side(small), {{"samples", "64"}});
+}
+
+TEST_F(PathIntegrator, ShadesAllMaterialsAsRtEmbreeDoes) {
+    expect_rt_embrees_picture(&squares_of_all_materials, from_the_side(small), {{"samples", "128"}});
 }
 
 TEST_F(PathIntegrator, ChangesCatchersAsRtEmbreeDoes) {

@@ -20,7 +20,7 @@ extern "C" {
 #endif
 
 #define ARHOST_SCENE_MAGIC 0x435354534f485241ull /* "ARHOSTSC" */
-#define ARHOST_SCENE_VERSION 4u
+#define ARHOST_SCENE_VERSION 5u
 #define ARHOST_NONE 0xffffffffu
 
 /* An array in the arena: `count` elements, `stride` bytes apart. If `count` is 0, the array is absent. */
@@ -49,11 +49,16 @@ typedef struct arhost_geometry {
                                 space, mm; a skinned mesh is in its bind pose */
     arhost_buffer normals;   /* 3 floats per vertex, unit length, for smooth shading; absent: flat shading. Smooth
                                 facets do not shadow themselves where the interpolated normal faces the light */
-    arhost_buffer texcoords; /* 2 floats per vertex; (0, 0): top left corner of the texture, (1, 1): bottom right */
-    arhost_buffer indices;   /* 3 uint32 per triangle, each < positions.count */
+    /* Texture coordinates: 2 floats per vertex; (0, 0): top left corner of the image, (1, 1): bottom right. There may
+     * be several sets: first the coordinates of all vertices in set 0, then those in set 1, … */
+    arhost_buffer texcoords;
+    arhost_buffer colours; /* 4 uint16 per vertex, 0 to 65535 for 0 to 1: linear RGB, which multiplies `ambient` and
+                              `diffuse` of the material, and opacity, which multiplies its `opacity` */
+    arhost_buffer indices; /* 3 uint32 per triangle, each < positions.count */
     /* Present only in deforming triangle meshes. The worker evaluates these buffers (arhost/motion.h). */
-    arhost_buffer joints;          /* 4 uint16 per vertex: indices into the skin's joints */
-    arhost_buffer weights;         /* 4 floats per vertex, 0 to 1, sum 1 */
+    arhost_buffer joints;  /* 4 uint16 per vertex: indices into the skin's joints; if a vertex has more than 4,
+                              more sets follow, as those of texcoords do */
+    arhost_buffer weights; /* 4 floats per vertex and set, 0 to 1; the sum of all of a vertex is 1 */
     arhost_buffer morph_positions; /* displacements, 3 floats per vertex and morph target: first those of all vertices
                                       for target 0, then for target 1, … */
     arhost_buffer morph_normals;   /* changes of the normals, in the same order; may be absent */
@@ -67,17 +72,27 @@ enum {
     ARHOST_TEXEL_RGBA8 = 2,  /* R, G, B, A bytes, linear: data rather than colour */
     ARHOST_TEXEL_RGBA32F = 3 /* 4 floats, linear light, 0 to 1e6 */
 };
-typedef int32_t arhost_wrap;
-enum { ARHOST_WRAP_REPEAT = 1, ARHOST_WRAP_CLAMP = 2, ARHOST_WRAP_MIRROR = 3 };
 
-/* Sampled bilinearly; the centre of texel (i, j) is at u = (i + ½)/width, v = (j + ½)/height. sRGB texels are
- * linearised before interpolation. */
-typedef struct arhost_texture {
+typedef struct arhost_texel_image {
     arhost_texel_format format;
     uint32_t width, height; /* texels, 1 to 16384 */
+    uint32_t name;          /* byte offset into `names` of a NUL-terminated string */
+    arhost_buffer texels;   /* width·height, top row first; stride 4 or 16 */
+} arhost_texel_image;
+
+typedef int32_t arhost_wrap;
+enum { ARHOST_WRAP_REPEAT = 1, ARHOST_WRAP_CLAMP = 2, ARHOST_WRAP_MIRROR = 3 };
+typedef int32_t arhost_texel_filter;
+enum { ARHOST_TEXEL_FILTER_LINEAR = 1, ARHOST_TEXEL_FILTER_NEAREST = 2 };
+
+/* How a material reads an image. The centre of texel (i, j) is at u = (i + ½)/width, v = (j + ½)/height. LINEAR
+ * interpolates bilinearly; sRGB texels are linearised before interpolation. */
+typedef struct arhost_texture {
+    uint32_t image; /* index */
     arhost_wrap wrap_u, wrap_v;
-    uint32_t name;        /* byte offset into `names` of a NUL-terminated string */
-    arhost_buffer texels; /* width·height, top row first; stride 4 or 16 */
+    arhost_texel_filter filter;
+    uint32_t texcoord_set;        /* of the geometry */
+    float image_from_texcoord[6]; /* column-major 2×3: (u, v) = columns 0 and 1 · texture coordinates + column 2 */
 } arhost_texture;
 
 /* ---- materials ---- */
@@ -90,7 +105,8 @@ enum {
     ARHOST_MATERIAL_METAL = 4,    /* Lambert + Phong + perfect reflection · Schlick's Fresnel term with
                                      F0 = `reflectivity` */
     ARHOST_MATERIAL_GLASS = 5,    /* refraction and reflection weighted by a Fresnel term, absorption inside */
-    ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* as in glTF 2.0: GGX specular over Lambert diffuse */
+    ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6, /* as in glTF 2.0: GGX specular over Lambert diffuse */
+    ARHOST_MATERIAL_UNLIT = 7 /* has the radiance `diffuse` in each direction, under any light; is no light source */
 };
 
 /* Colours are linear light, 0 to 1, Rec. 709 primaries. A texture field is an index or ARHOST_NONE. The value of the
@@ -98,20 +114,48 @@ enum {
  * model ignores fields that do not apply to it: mirror and glass have no diffuse colour and no emission. */
 typedef struct arhost_material {
     arhost_material_model model;
-    uint32_t colour_texture; /* multiplies ambient and diffuse; its alpha is compared with alpha_cutoff */
+    uint32_t colour_texture; /* multiplies ambient and diffuse; its alpha multiplies `opacity` */
     float ambient[3];        /* Ka; multiplies the scene's ambient light */
     float diffuse[3];        /* Kd; metallic-roughness: base colour */
-    float specular[3];       /* Ks */
+    float specular[3];       /* Ks, 0 to 1; metallic-roughness: see there, 0 to 1e6 */
     float exponent;          /* Phong exponent, >= 1 */
     float reflectivity[3];   /* Kr; glass: tint of reflected light */
     float emission[3];       /* emitted radiance, 0 to 1e6 */
-    float alpha_cutoff;      /* alpha test: surface points whose colour_texture alpha is lower are cut out; 0: none */
+    /* The opacity of a surface point is `opacity` · alpha of colour_texture · opacity of the vertex colour. */
+    float opacity;      /* 0 to 1 */
+    float alpha_cutoff; /* points of a lower opacity are cut out; 0: none */
+    uint32_t blends; /* non-zero: light passes points in proportion to 1 − their opacity, without refraction, and the
+                        points reflect and emit light in proportion to their opacity. With ARHOST_INTEGRATOR_WHITTED,
+                        points of an opacity below ½ are cut out instead. Zero: points that are not cut out are
+                        opaque */
 
-    /* Metallic-roughness. Glass uses `roughness`, too. */
+    /* Metallic-roughness. Glass uses `roughness`, too. The reflectance of non-metals at normal incidence is
+     * min(((index − 1)/(index + 1))² · `specular` · specular_colour_texture, 1) · w, and at grazing incidence w,
+     * where w = specular_weight · alpha of specular_texture (KHR_materials_ior, KHR_materials_specular). */
     float metallic, roughness;           /* 0 to 1 */
     uint32_t metallic_roughness_texture; /* G: roughness, B: metallic */
     uint32_t normal_texture; /* tangent-space normal = 2 · texel − 1: R along +u, G along −v, B outwards */
     uint32_t emission_texture;
+    float normal_scale;         /* multiplies R and G of the tangent-space normal */
+    uint32_t occlusion_texture; /* ambient light is multiplied by 1 + occlusion_strength · (R − 1) */
+    float occlusion_strength;   /* 0 to 1 */
+    float specular_weight;      /* 0 to 1 */
+    uint32_t specular_texture, specular_colour_texture;
+    /* Metallic-roughness with ARHOST_INTEGRATOR_PATH: the share `transmission` · R of transmission_texture · (1 −
+     * metallic) of the diffuse light is refracted instead, by microfacets of the same roughness, and tinted by the
+     * diffuse colour: by its square root at each surface of a solid, by itself at a thin wall. A solid refracts by
+     * `index` and absorbs by `extinction`. A thin wall does neither (KHR_materials_transmission,
+     * KHR_materials_volume). */
+    float transmission; /* 0 to 1 */
+    uint32_t transmission_texture;
+    uint32_t thin_walled;
+    /* Metallic-roughness with ARHOST_INTEGRATOR_PATH: a dielectric layer of index 1.5 above the surface, with the
+     * share `clearcoat` · R of clearcoat_texture, the roughness clearcoat_roughness · G of its texture, and normals
+     * of its own (KHR_materials_clearcoat). */
+    float clearcoat, clearcoat_roughness; /* 0 to 1 */
+    uint32_t clearcoat_texture, clearcoat_roughness_texture;
+    uint32_t clearcoat_normal_texture; /* ARHOST_NONE: the normals of the vertices */
+    float clearcoat_normal_scale;
 
     /* Glass. Its reflectance is clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), or 1 at total
      * internal reflection. c is the cosine of the angle between the normal and the ray on the outside of the glass,
@@ -154,6 +198,9 @@ typedef struct arhost_object {
     uint32_t deforms;    /* non-zero: each request contains the vertices of the object (arhost/motion.h); no other
                             object shares its geometry */
     uint32_t node, skin; /* indices or ARHOST_NONE; used by the worker to animate the object */
+    uint32_t hides_back_faces; /* non-zero: the eye does not see back faces, also not in mirrors and through glass.
+                                  They block and reflect other light */
+    uint32_t reserved;         /* 0 */
 } arhost_object;
 
 /* ---- animation: evaluated by the worker (arhost/motion.h); ray tracers may ignore it ---- */
@@ -187,7 +234,7 @@ typedef struct arhost_channel {
     uint32_t node;
     arhost_channel_target target;
     arhost_interpolation interpolation;
-    uint32_t reserved;
+    float period_s;       /* the values repeat with this period; 0: they play once, and the last one stays */
     arhost_buffer times;  /* floats, one per key: time in s, ascending */
     arhost_buffer values; /* floats, per key: 3 (translation, scale), 4 (rotation) or one per morph weight;
                               three times as many for CUBIC */
@@ -243,7 +290,7 @@ typedef struct arhost_light {
 /* Environment map in equirectangular projection: a unit direction (x, y, z) in environment coordinates, y up, maps to
  * u = ½ + atan2(x, −z)/2π, v = acos(y)/π. */
 typedef struct arhost_environment {
-    uint32_t texture;                /* index, RGBA32F; ARHOST_NONE: no environment */
+    uint32_t texture;                /* index, of an RGBA32F image; ARHOST_NONE: no environment */
     float intensity;                 /* multiplies the texels */
     float environment_from_world[9]; /* rotation, column-major 3×3 */
     /* Non-zero: the texels are also multiplied by the mean colour of the video under the overlay, in linear light and
@@ -286,11 +333,12 @@ typedef struct arhost_scene {
      * g = decode(0.5): over mid-grey, the overlay hides the right share of the linear light. */
     float shadow_alpha_opaque, shadow_alpha_translucent;
     uint32_t coloured_shadows; /* non-zero: glass casts coloured shadows on catchers */
-    float duration_s;          /* period of the repeating animation, s; 0: no animation */
+    float duration_s;          /* > 0: there is animation; the longest time that one of its parts takes, s */
     arhost_integrator integrator;
     uint32_t reserved; /* 0 */
     arhost_environment environment;
     arhost_buffer geometries; /* arhost_geometry, stride sizeof */
+    arhost_buffer images;     /* arhost_texel_image */
     arhost_buffer textures;   /* arhost_texture */
     arhost_buffer materials;  /* arhost_material */
     arhost_buffer objects;    /* arhost_object; may be absent */

@@ -602,7 +602,7 @@ unsafe impl Sync for arhost_tracker {} // a plugin's statics are immutable
 // ---- arhost/scene.h ----
 
 pub const ARHOST_SCENE_MAGIC: u64 = 0x435354534f485241;
-pub const ARHOST_SCENE_VERSION: u32 = 4;
+pub const ARHOST_SCENE_VERSION: u32 = 5;
 pub const ARHOST_NONE: u32 = 0xffffffff;
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -626,33 +626,46 @@ pub struct arhost_geometry {
     pub positions: arhost_buffer,
     pub normals: arhost_buffer,
     pub texcoords: arhost_buffer,
+    pub colours: arhost_buffer,
     pub indices: arhost_buffer,
     pub joints: arhost_buffer,
     pub weights: arhost_buffer,
     pub morph_positions: arhost_buffer,
     pub morph_normals: arhost_buffer,
 }
-const _: () = assert!(size_of::<arhost_geometry>() == 136);
+const _: () = assert!(size_of::<arhost_geometry>() == 152);
 pub type arhost_texel_format = i32;
 pub const ARHOST_TEXEL_SRGB8: arhost_texel_format = 1;
 pub const ARHOST_TEXEL_RGBA8: arhost_texel_format = 2;
 pub const ARHOST_TEXEL_RGBA32F: arhost_texel_format = 3;
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_texel_image {
+    pub format: arhost_texel_format,
+    pub width: u32,
+    pub height: u32,
+    pub name: u32,
+    pub texels: arhost_buffer,
+}
+const _: () = assert!(size_of::<arhost_texel_image>() == 32);
 pub type arhost_wrap = i32;
 pub const ARHOST_WRAP_REPEAT: arhost_wrap = 1;
 pub const ARHOST_WRAP_CLAMP: arhost_wrap = 2;
 pub const ARHOST_WRAP_MIRROR: arhost_wrap = 3;
+pub type arhost_texel_filter = i32;
+pub const ARHOST_TEXEL_FILTER_LINEAR: arhost_texel_filter = 1;
+pub const ARHOST_TEXEL_FILTER_NEAREST: arhost_texel_filter = 2;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_texture {
-    pub format: arhost_texel_format,
-    pub width: u32,
-    pub height: u32,
+    pub image: u32,
     pub wrap_u: arhost_wrap,
     pub wrap_v: arhost_wrap,
-    pub name: u32,
-    pub texels: arhost_buffer,
+    pub filter: arhost_texel_filter,
+    pub texcoord_set: u32,
+    pub image_from_texcoord: [f32; 6],
 }
-const _: () = assert!(size_of::<arhost_texture>() == 40);
+const _: () = assert!(size_of::<arhost_texture>() == 44);
 pub type arhost_material_model = i32;
 pub const ARHOST_MATERIAL_DIFFUSE: arhost_material_model = 1;
 pub const ARHOST_MATERIAL_SPECULAR: arhost_material_model = 2;
@@ -660,6 +673,7 @@ pub const ARHOST_MATERIAL_MIRROR: arhost_material_model = 3;
 pub const ARHOST_MATERIAL_METAL: arhost_material_model = 4;
 pub const ARHOST_MATERIAL_GLASS: arhost_material_model = 5;
 pub const ARHOST_MATERIAL_METALLIC_ROUGHNESS: arhost_material_model = 6;
+pub const ARHOST_MATERIAL_UNLIT: arhost_material_model = 7;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_material {
@@ -671,12 +685,29 @@ pub struct arhost_material {
     pub exponent: f32,
     pub reflectivity: [f32; 3],
     pub emission: [f32; 3],
+    pub opacity: f32,
     pub alpha_cutoff: f32,
+    pub blends: u32,
     pub metallic: f32,
     pub roughness: f32,
     pub metallic_roughness_texture: u32,
     pub normal_texture: u32,
     pub emission_texture: u32,
+    pub normal_scale: f32,
+    pub occlusion_texture: u32,
+    pub occlusion_strength: f32,
+    pub specular_weight: f32,
+    pub specular_texture: u32,
+    pub specular_colour_texture: u32,
+    pub transmission: f32,
+    pub transmission_texture: u32,
+    pub thin_walled: u32,
+    pub clearcoat: f32,
+    pub clearcoat_roughness: f32,
+    pub clearcoat_texture: u32,
+    pub clearcoat_roughness_texture: u32,
+    pub clearcoat_normal_texture: u32,
+    pub clearcoat_normal_scale: f32,
     pub index: f32,
     pub fresnel_exponent: f32,
     pub fresnel_minimum: f32,
@@ -689,7 +720,7 @@ pub struct arhost_material {
     pub reflection_depth: u32,
     pub refraction_depth: u32,
 }
-const _: () = assert!(size_of::<arhost_material>() == 172);
+const _: () = assert!(size_of::<arhost_material>() == 240);
 pub type arhost_role = i32;
 pub const ARHOST_ROLE_VIRTUAL: arhost_role = 1;
 pub const ARHOST_ROLE_CATCHER: arhost_role = 2;
@@ -706,8 +737,10 @@ pub struct arhost_object {
     pub deforms: u32,
     pub node: u32,
     pub skin: u32,
+    pub hides_back_faces: u32,
+    pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_object>() == 80);
+const _: () = assert!(size_of::<arhost_object>() == 88);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_node {
@@ -735,7 +768,7 @@ pub struct arhost_channel {
     pub node: u32,
     pub target: arhost_channel_target,
     pub interpolation: arhost_interpolation,
-    pub reserved: u32,
+    pub period_s: f32,
     pub times: arhost_buffer,
     pub values: arhost_buffer,
 }
@@ -813,6 +846,7 @@ pub struct arhost_scene {
     pub reserved: u32,
     pub environment: arhost_environment,
     pub geometries: arhost_buffer,
+    pub images: arhost_buffer,
     pub textures: arhost_buffer,
     pub materials: arhost_buffer,
     pub objects: arhost_buffer,
@@ -823,7 +857,7 @@ pub struct arhost_scene {
     pub names: arhost_buffer,
     pub anchors: arhost_buffer,
 }
-const _: () = assert!(size_of::<arhost_scene>() == 344);
+const _: () = assert!(size_of::<arhost_scene>() == 360);
 
 // ---- arhost/motion.h ----
 

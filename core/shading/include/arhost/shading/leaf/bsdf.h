@@ -29,13 +29,17 @@ ARHOST_LEAF Vec3 mirror_direction_off_facet(Vec3 incident, Vec3 normal, Vec3 fac
     return select(dot(by_normal, facet) > Float(0.0), by_normal, mirror_direction(incident, facet));
 }
 
-// Schlick's Fresnel approximation: reflectance `f0` at normal incidence, 1 at grazing incidence
+// Schlick's Fresnel approximation: reflectance `f0` at normal incidence, `f90` at grazing incidence
 // (Schlick, An Inexpensive BRDF Model for Physically-based Rendering, CGF 13(3), 1994, eq. 15).
-ARHOST_LEAF Vec3 schlick(Vec3 f0, Float cosine) {
+ARHOST_LEAF Vec3 schlick_between(Vec3 f0, Float f90, Float cosine) {
     Float c = Float(1.0) - min(max(cosine, Float(0.0)), Float(1.0));
     Float c2 = c * c;
     Float grazing = c2 * c2 * c;
-    return f0 * (Float(1.0) - grazing) + vec3(grazing, grazing, grazing);
+    Float edge = f90 * grazing;
+    return f0 * (Float(1.0) - grazing) + vec3(edge, edge, edge);
+}
+ARHOST_LEAF Vec3 schlick(Vec3 f0, Float cosine) {
+    return schlick_between(f0, Float(1.0), cosine);
 }
 
 // Reflectance of glass: Schlick's term with configurable exponent and limits (table 2 of the dissertation).
@@ -83,11 +87,15 @@ ARHOST_LEAF Vec3 bouguer(Vec3 extinction, Float distance) {
     return vec3(exp2(power.x), exp2(power.y), exp2(power.z));
 }
 
-// Metallic-roughness material (glTF 2.0, appendix B.3). Reflectance at normal incidence: 4 % for dielectrics, the
-// base colour for metals.
-ARHOST_LEAF Vec3 metallic_reflectance(Vec3 base_colour, Float metallic) {
-    Float dielectric = Float(0.04) * (Float(1.0) - metallic);
-    return vec3(dielectric, dielectric, dielectric) + base_colour * metallic;
+// Reflectance of a dielectric at normal incidence (Fresnel 1823). `index`: refractive index.
+ARHOST_LEAF Float normal_reflectance(Float index) {
+    Float ratio = (index - Float(1.0)) / (index + Float(1.0));
+    return ratio * ratio;
+}
+// Metallic-roughness material (glTF 2.0, appendix B.3). Reflectance at normal incidence: that of the dielectric or,
+// for metals, the base colour.
+ARHOST_LEAF Vec3 metallic_reflectance(Vec3 dielectric, Vec3 base_colour, Float metallic) {
+    return dielectric * (Float(1.0) - metallic) + base_colour * metallic;
 }
 // Diffuse colour of a metallic-roughness material: black for metals.
 ARHOST_LEAF Vec3 metallic_diffuse(Vec3 base_colour, Float metallic) {

@@ -56,15 +56,16 @@ ARHOST_LEAF Vec3 tangent_along_v(Vec3 edge_1, Vec3 edge_2, Float u1, Float u2, F
 
 // Perturbs `normal` by the `texel` of a normal map. Makes the tangent orthogonal to the normal; the green axis points
 // in the direction of decreasing v (glTF 2.0, section 3.9.3). Returns `normal` unchanged if the result would point
-// into the surface or if there is no tangent. `facet`: geometric normal.
-ARHOST_LEAF Vec3 perturbed_normal(Vec3 normal, Vec3 facet, Vec3 along_u, Vec3 along_v, Vec3 texel) {
+// into the surface or if there is no tangent. `facet`: geometric normal;
+// `scale`: of red and green.
+ARHOST_LEAF Vec3 perturbed_normal(Vec3 normal, Vec3 facet, Vec3 along_u, Vec3 along_v, Vec3 texel, Float scale) {
     Vec3 n = normalize(normal);
     Vec3 tangent = along_u - n * dot(n, along_u);
     Vec3 right = normalize(tangent);
     Vec3 side = cross(n, right);
     Vec3 up = select(dot(side, along_v) > Float(0.0), -side, side);
-    Vec3 mapped = right * (texel.x * Float(2.0) - Float(1.0)) + up * (texel.y * Float(2.0) - Float(1.0)) +
-                  n * (texel.z * Float(2.0) - Float(1.0));
+    Vec3 mapped = right * ((texel.x * Float(2.0) - Float(1.0)) * scale) +
+                  up * ((texel.y * Float(2.0) - Float(1.0)) * scale) + n * (texel.z * Float(2.0) - Float(1.0));
     Vec3 outwards = select(dot(mapped, facing(facet, n)) > Float(0.0), mapped, normal);
     return select(dot(tangent, tangent) > Float(0.0), outwards, normal);
 }
