@@ -2,6 +2,7 @@
 #include "scene/image.hpp"
 
 #include "scene/image_reader.hpp"
+#include "scene/srgb.hpp"
 
 #include <dlfcn.h>
 
@@ -89,8 +90,8 @@ void clamp_radiance(const Image &image, const std::string &name, const Reporter 
 const std::array<float, 256> &linear_from_byte() {
     static const std::array<float, 256> table = [] {
         std::array<float, 256> t;
-        for (int i = 0; i < 256; ++i) // IEC 61966-2-1
-            t[i] = static_cast<float>(i <= 10 ? i / 255.0 / 12.92 : std::pow((i / 255.0 + 0.055) / 1.055, 2.4));
+        for (int i = 0; i < 256; ++i)
+            t[i] = static_cast<float>(linear_from_srgb(i / 255.0));
         return t;
     }();
     return table;

@@ -85,6 +85,57 @@ std::vector<glm::vec3> smooth_normals(const TriangleMesh &mesh) {
     return normals;
 }
 
+void weld(TriangleMesh &mesh) {
+    std::vector<std::uint32_t> index = welded(mesh.positions);
+    std::uint32_t count = 0;
+    for (std::uint32_t i = 0; i < index.size(); ++i) {
+        if (index[i] != i) {
+            index[i] = index[index[i]]; // the first vertex at this position already has its new index
+            continue;
+        }
+        mesh.positions[count] = mesh.positions[i];
+        index[i] = count++;
+    }
+    mesh.positions.resize(count);
+    for (glm::uvec3 &t : mesh.triangles)
+        t = {index[t.x], index[t.y], index[t.z]};
+}
+
+std::vector<TriangleMesh> split(const TriangleMesh &mesh, const std::vector<std::size_t> &parts, std::size_t count) {
+    std::vector<TriangleMesh> split(count);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+        split[parts[i]].triangles.push_back(mesh.triangles[i]);
+    const std::size_t sets = mesh.texcoords.size() / mesh.positions.size();
+    std::vector<std::uint32_t> index(mesh.positions.size(), ARHOST_NONE);
+    std::vector<std::uint32_t> vertices; // of the part
+    for (TriangleMesh &part : split) {
+        vertices.clear();
+        for (glm::uvec3 &t : part.triangles)
+            for (int corner = 0; corner < 3; ++corner) {
+                const std::uint32_t vertex = t[corner];
+                if (index[vertex] == ARHOST_NONE) {
+                    index[vertex] = static_cast<std::uint32_t>(vertices.size());
+                    vertices.push_back(vertex);
+                }
+                t[corner] = index[vertex];
+            }
+        const auto copy = [&](const auto &from, auto &to, std::size_t first) {
+            for (const std::uint32_t vertex : vertices)
+                to.push_back(from[first + vertex]);
+        };
+        copy(mesh.positions, part.positions, 0);
+        if (!mesh.normals.empty())
+            copy(mesh.normals, part.normals, 0);
+        for (std::size_t set = 0; set < sets; ++set)
+            copy(mesh.texcoords, part.texcoords, set * mesh.positions.size());
+        if (!mesh.colours.empty())
+            copy(mesh.colours, part.colours, 0);
+        for (const std::uint32_t vertex : vertices)
+            index[vertex] = ARHOST_NONE;
+    }
+    return split;
+}
+
 void complete_normals(TriangleMesh &mesh, std::optional<bool> smooth) {
     if (smooth == false)
         mesh.normals.clear();

@@ -203,4 +203,11 @@ std::string token_at(const char *p, const char *end) {
     return token;
 }
 
+std::string printable(std::string text) {
+    for (char &c : text)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            c = '?';
+    return text.substr(0, 200);
+}
+
 } // namespace arhost::scene

@@ -76,6 +76,9 @@ inline void skip_line(const char *&p, const char *end) {
 // Returns the token at p for error messages: shortened, and with '?' for each character that is not printable ASCII.
 std::string token_at(const char *p, const char *end);
 
+// Returns at most 200 bytes of `text` for messages and names, with '?' for control characters.
+std::string printable(std::string text);
+
 // Parses the number at p and moves p past it. Returns false if there is no number.
 inline bool read_number(const char *&p, const char *end, float &value) {
     const char *begin = p < end && *p == '+' ? p + 1 : p;

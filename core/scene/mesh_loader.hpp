@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Loads triangle meshes from OBJ and PLY files, plain or gzip-compressed.
+// Loads triangle meshes from OBJ, PLY and STL files, plain or gzip-compressed.
 #pragma once
 
 #include "scene/callbacks.hpp"
@@ -22,6 +22,9 @@ struct MeshOptions {
 
 // Returns a mesh with at least one triangle. Positions are those of the file, texture coordinates are as defined in
 // arhost/scene.h, normals have unit length, and polygons are triangulated. Throws MeshError.
+MeshWithMaterials load_mesh_with_materials(const std::filesystem::path &file, const MeshOptions &options = {},
+                                           const LoadCallbacks &callbacks = {});
+// Likewise, without materials; logs if the file has any.
 TriangleMesh load_mesh(const std::filesystem::path &file, const MeshOptions &options = {},
                        const LoadCallbacks &callbacks = {});
 

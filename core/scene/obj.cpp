@@ -2,11 +2,14 @@
 #include "scene/obj.hpp"
 
 #include "scene/polygon.hpp"
+#include "scene/srgb.hpp"
 
 #include <arhost/scene.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <map>
 
 namespace arhost::scene {
 namespace {
@@ -16,7 +19,7 @@ public:
     ObjParser(const MeshFile &file, const Reporter &reporter)
         : file_(file), reporter_(reporter), p_(file.begin()), end_(file.end()) {}
 
-    TriangleMesh parse() {
+    MeshWithMaterials parse() {
         if (file_.view().starts_with("\xef\xbb\xbf")) // UTF-8 byte order mark
             p_ += 3;
         const char *next_report = p_;
@@ -31,13 +34,14 @@ public:
         if (corners_[0].empty())
             file_.fail("contains no triangles" + std::string(other_shapes_ ? ", only points, lines or curves" : "") +
                        (positions_.empty() ? ", and no vertices" : ""));
-        if (uses_materials_)
-            reporter_.info(file_.name() + ": the MTL materials are ignored; the scene file defines the materials");
-        return mesh();
+        if (!colours_.empty())
+            colours_.resize(positions_.size(), no_colour);
+        return {mesh(), std::move(uses_)};
     }
 
 private:
     enum { Position, Texcoord, Normal };
+    static constexpr glm::u16vec4 no_colour{65535};
 
     void statement() {
         skip_blanks(p_, end_);
@@ -45,13 +49,15 @@ private:
         if (word("f"))
             face(line);
         else if (word("v"))
-            positions_.push_back(numbers<glm::vec3>(line, 3, "a vertex"));
+            vertex(line);
         else if (word("vn"))
             normals_.push_back(numbers<glm::vec3>(line, 3, "a normal"));
         else if (word("vt"))
             texcoords_.push_back(numbers<glm::vec2>(line, 1, "a texcoord"));
-        else if (word("usemtl") || word("mtllib"))
-            uses_materials_ = true;
+        else if (word("usemtl"))
+            use_material(line);
+        else if (word("mtllib"))
+            uses_.libraries.emplace_back(rest_of_line());
         else if (word("l") || word("p") || word("curv") || word("surf"))
             other_shapes_ = true;
     }
@@ -99,6 +105,43 @@ private:
                 file_.fail_line(token, std::string(what) + " has the invalid number '" + token_at(token, end_) + "'");
         }
         return values;
+    }
+
+    void vertex(const char *line) {
+        positions_.push_back(numbers<glm::vec3>(line, 3, "a vertex"));
+        std::array<float, 4> colour{0, 0, 0, 1};
+        std::size_t count = 0;
+        while (count < colour.size() && !at_line_end() && read_number(p_, end_, colour[count]))
+            ++count;
+        if (count < 3) // a weight
+            return;
+        colours_.resize(positions_.size() - 1, no_colour);
+        const auto linear = [&](std::size_t i) {
+            return colour_channel(linear_from_srgb(static_cast<double>(colour[i])));
+        };
+        colours_.emplace_back(linear(0), linear(1), linear(2), colour_channel(static_cast<double>(colour[3])));
+    }
+
+    // Names may contain blanks.
+    std::string_view rest_of_line() {
+        skip_blanks(p_, end_);
+        const char *stop = std::find(p_, end_, '\n');
+        while (stop > p_ && is_blank(stop[-1]))
+            --stop;
+        return {p_, static_cast<std::size_t>(stop - p_)};
+    }
+
+    void use_material(const char *line) {
+        const auto [name, is_new] = names_.try_emplace(std::string(rest_of_line()), uses_.names.size());
+        if (is_new) {
+            line_number_ += static_cast<std::size_t>(std::count(counted_, line, '\n'));
+            counted_ = line;
+            uses_.names.push_back({name->first, line_number_});
+        }
+        const std::size_t first_triangle = corners_[Position].size();
+        if (!uses_.runs.empty() && uses_.runs.back().first_triangle == first_triangle)
+            uses_.runs.pop_back();
+        uses_.runs.push_back({first_triangle, name->second});
     }
 
     // Corners are v, v/vt, v//vn or v/vt/vn; indices count from 1, or backwards from -1.
@@ -165,7 +208,7 @@ private:
             used_[Normal] = false;
         }
         if (!used_[Normal] && !used_[Texcoord])
-            return {std::move(positions_), {}, {}, std::move(corners_[Position])};
+            return {std::move(positions_), {}, {}, std::move(corners_[Position]), std::move(colours_)};
         return with_joined_vertices();
     }
 
@@ -209,6 +252,8 @@ private:
                 mesh.texcoords.push_back(triple.y == ARHOST_NONE ? glm::vec2(0) : texcoords_[triple.y]);
             if (used_[Normal])
                 mesh.normals.push_back(normals_[triple.z]);
+            if (!colours_.empty())
+                mesh.colours.push_back(colours_[triple.x]);
         }
         return mesh;
     }
@@ -218,16 +263,21 @@ private:
     const char *p_, *end_;
     std::vector<glm::vec3> positions_, normals_;
     std::vector<glm::vec2> texcoords_;
+    std::vector<glm::u16vec4> colours_;  // of the first positions
     std::vector<glm::uvec3> corners_[3]; // per triangle, indexed by the enum above
     bool used_[3] = {true, false, false};
     std::vector<std::uint32_t> polygon_[3];
     std::vector<glm::uvec3> triangles_;
-    bool uses_materials_ = false, other_shapes_ = false;
+    MaterialUses uses_;
+    std::map<std::string, std::size_t> names_; // indices in uses_.names
+    const char *counted_ = p_;                 // start of the line `line_number_`
+    std::size_t line_number_ = 1;
+    bool other_shapes_ = false;
 };
 
 } // namespace
 
-TriangleMesh parse_obj(MeshFile &file, const Reporter &reporter) {
+MeshWithMaterials parse_obj(MeshFile &file, const Reporter &reporter) {
     file.normalize_line_ends();
     return ObjParser(file, reporter).parse();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Wavefront OBJ files: v, vn, vt and f. Ignores vertex colours, groups, smoothing groups, materials, points,
-// lines and curves.
+// Wavefront OBJ files: v, vn, vt, f, mtllib and usemtl. Ignores groups, smoothing groups, points, lines and curves.
+// `v` may have a colour after the coordinates: sRGB-encoded RGB and opacity, as MeshLab and Blender write it.
 #pragma once
 
 #include "scene/callbacks.hpp"
@@ -11,6 +11,6 @@
 namespace arhost::scene {
 
 // Does not flip texcoords: v = 0 is the bottom of the texture. Throws MeshError.
-TriangleMesh parse_obj(MeshFile &file, const Reporter &reporter);
+MeshWithMaterials parse_obj(MeshFile &file, const Reporter &reporter);
 
 } // namespace arhost::scene

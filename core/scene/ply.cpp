@@ -2,6 +2,7 @@
 #include "scene/ply.hpp"
 
 #include "scene/polygon.hpp"
+#include "scene/srgb.hpp"
 
 #include <arhost/scene.h>
 
@@ -320,6 +321,24 @@ bool is_corner_list(const Property &property) {
     return property.is_list && is_one_of(property.name, {"vertex_indices", "vertex_index"});
 }
 
+// Converts a channel of a vertex colour.
+std::uint16_t channel_of(float value, Type type, bool is_encoded) {
+    static const std::array<std::uint16_t, 256> linear_from_byte = [] {
+        std::array<std::uint16_t, 256> table{};
+        for (std::size_t i = 0; i < table.size(); ++i)
+            table[i] = colour_channel(linear_from_srgb(static_cast<double>(i) / 255));
+        return table;
+    }();
+    const auto real = static_cast<double>(value);
+    if (!is_integer(type))
+        return colour_channel(real);
+    const double highest = size_of(type) == 1 ? 255 : 65535;
+    if (!is_encoded)
+        return colour_channel(real / highest);
+    return size_of(type) == 1 ? linear_from_byte[static_cast<std::size_t>(std::clamp(real, 0.0, highest))]
+                              : colour_channel(linear_from_srgb(real / highest));
+}
+
 template <class Reader> class BodyParser {
 public:
     BodyParser(const MeshFile &file, const Reporter &reporter, const Header &header, Reader reader)
@@ -386,16 +405,17 @@ private:
     }
 
     void vertices(const Element &element) {
-        enum { X, NX = 3, S = 6, Slots = 8, Skipped = 8 };
+        enum { X, NX = 3, S = 6, Red = 8, Alpha = 11, Slots = 12, Skipped = 12 };
         std::vector<int> slots;
         std::array<bool, Slots> present{};
         for (const Property &property : element.properties) {
-            static constexpr std::string_view names[] = {"x", "y", "z", "nx", "ny", "nz"};
+            static constexpr std::string_view names[] = {"x", "y", "z",   "nx",    "ny",   "nz",
+                                                         "s", "t", "red", "green", "blue", "alpha"};
             int slot = static_cast<int>(std::find(std::begin(names), std::end(names), property.name) - names);
-            if (slot == S && is_one_of(property.name, {"s", "u", "texture_u", "texture_s"}))
+            if (is_one_of(property.name, {"u", "texture_u", "texture_s"}))
                 slot = S;
-            else if (slot == S)
-                slot = is_one_of(property.name, {"t", "v", "texture_v", "texture_t"}) ? S + 1 : Skipped;
+            else if (is_one_of(property.name, {"v", "texture_v", "texture_t"}))
+                slot = S + 1;
             slots.push_back(property.is_list ? Skipped : slot);
             if (slots.back() != Skipped)
                 present[static_cast<std::size_t>(slot)] = true;
@@ -404,13 +424,16 @@ private:
             file_.fail("each vertex must have the properties x, y and z");
         const bool has_normals = present[NX] && present[NX + 1] && present[NX + 2];
         const bool has_texcoords = present[S] && present[S + 1];
+        const bool has_colours = present[Red] && present[Red + 1] && present[Red + 2];
         mesh_ = {};
         mesh_.positions.reserve(element.count);
         mesh_.normals.reserve(has_normals ? element.count : 0);
         mesh_.texcoords.reserve(has_texcoords ? element.count : 0);
+        mesh_.colours.reserve(has_colours ? element.count : 0);
 
         std::size_t at = 0;
         std::array<float, Slots> values{};
+        glm::u16vec4 colour(65535);
         each(element, [&](const Property &property) {
             const int slot = slots[at];
             if (slot == Skipped) {
@@ -419,7 +442,10 @@ private:
                 const float value = reader_.real(property.type);
                 if (!std::isfinite(value))
                     reader_.fail(reader_.here() + ": '" + property.name + "' is not finite");
-                values[static_cast<std::size_t>(slot)] = value;
+                if (slot >= Red)
+                    colour[slot - Red] = channel_of(value, property.type, slot != Alpha);
+                else
+                    values[static_cast<std::size_t>(slot)] = value;
             }
             if (++at < slots.size())
                 return;
@@ -429,6 +455,8 @@ private:
                 mesh_.normals.emplace_back(values[NX], values[NX + 1], values[NX + 2]);
             if (has_texcoords)
                 mesh_.texcoords.emplace_back(values[S], values[S + 1]);
+            if (has_colours)
+                mesh_.colours.push_back(colour);
         });
     }
 

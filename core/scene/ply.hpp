@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // PLY files (Turk 1994), ascii and binary in both byte orders: the elements `vertex` and `face`. Ignores all
-// other elements and properties.
+// other elements and properties. Colours of vertices are sRGB-encoded if they are integers, and linear if they are
+// floats, 0 to 1.
 #pragma once
 
 #include "scene/callbacks.hpp"

@@ -5,8 +5,11 @@
 #include "scene/default_light.hpp"
 #include "scene/gltf/gltf.hpp"
 #include "scene/material_textures.hpp"
+#include "scene/mesh_file.hpp"
 #include "scene/mesh_loader.hpp"
+#include "scene/mtl_materials.hpp"
 #include "scene/shapes.hpp"
+#include "scene/srgb.hpp"
 #include "scene/stand_in.hpp"
 #include "scene/textures.hpp"
 
@@ -48,11 +51,6 @@ double length_of(const Node &node) {
     if (static_cast<float>(length) <= 0)
         node.fail("must be greater than 0");
     return length;
-}
-
-// IEC 61966-2-1.
-double linear_from_srgb(double encoded) {
-    return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
 }
 
 // Reads a colour: "#rrggbb" in sRGB, or a number or a list of three numbers in linear light.
@@ -569,8 +567,9 @@ TriangleMesh stand_in_of(const Node &node, const MeshOptions &options) {
     return mesh;
 }
 
-TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &world_from_object,
-                     const LoadCallbacks &callbacks) {
+// Returns the mesh without materials if the object has its own.
+MeshWithMaterials mesh_of(const Node &object, const Node &path, const Transform &world_from_object,
+                          const LoadCallbacks &callbacks) {
     MeshOptions options;
     if (const auto smooth = object.find("smooth"))
         options.smooth = smooth->boolean();
@@ -582,8 +581,14 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
                           " is missing; a stand-in with the triangle count set in the scene is drawn instead; "
                           "tools/get-models downloads the available meshes");
     try {
-        TriangleMesh mesh =
-            missing ? stand_in_of(*stand_in, options) : load_mesh(path.input_path(), options, callbacks);
+        MeshWithMaterials loaded;
+        if (missing)
+            loaded.mesh = stand_in_of(*stand_in, options);
+        else if (object.find("material"))
+            loaded.mesh = load_mesh(path.input_path(), options, callbacks);
+        else
+            loaded = load_mesh_with_materials(path.input_path(), options, callbacks);
+        TriangleMesh &mesh = loaded.mesh;
         world_from_object.apply(mesh);
         check_extent(path, mesh.positions);
         if (std::ranges::any_of(mesh.texcoords, [](const glm::vec2 &t) {
@@ -594,7 +599,7 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
             callbacks.info(path.input_path().string() + (missing ? " (stand-in): " : ": ") +
                            std::to_string(mesh.triangles.size()) + " triangles, " +
                            std::to_string(mesh.positions.size()) + " vertices, " + extent_of(mesh));
-        return mesh;
+        return loaded;
     } catch (const MeshError &error) {
         path.fail(error.what());
     }
@@ -659,7 +664,8 @@ private:
         if (const auto animation = node.find("animation"); animation && shape_key != "gltf")
             animation->fail("is only allowed with 'gltf'; use 'motion' for other objects");
         const std::string name = name_of(node, shape_key + " " + std::to_string(index));
-        const auto material_node = shape_key == "gltf" ? node.find("material") : node.require("material");
+        const bool may_have_materials = shape_key == "gltf" || shape_key == "mesh";
+        const auto material_node = may_have_materials ? node.find("material") : node.require("material");
         std::optional<std::uint32_t> material;
         if (material_node)
             material = material_index(*material_node);
@@ -686,10 +692,14 @@ private:
                            .reads = readable_},
                           part);
         } else {
-            const std::uint32_t geometry = add_geometry(node, shape_key, shape, world_from_object, *material, part);
-            const bool moves = motion_node != ARHOST_NONE;
-            builder_.add_object(name, geometry, *material, role, glm::mat4x3(1),
-                                {moves, false, motion_node, ARHOST_NONE});
+            const Motion motion{motion_node != ARHOST_NONE, false, motion_node, ARHOST_NONE};
+            if (material) {
+                const std::uint32_t geometry =
+                    add_geometry(node, shape_key, shape, world_from_object, *material, part);
+                builder_.add_object(name, geometry, *material, role, glm::mat4x3(1), motion);
+            } else {
+                add_parts(name, shape, mesh_of(node, shape, world_from_object, part), role, motion, part);
+            }
         }
         Reporter(part, name).report(1);
     }
@@ -760,6 +770,39 @@ private:
         }
     }
 
+    // Adds one object for each material of an OBJ file.
+    void add_parts(const std::string &name, const Node &path, const MeshWithMaterials &loaded, arhost_role role,
+                   const Motion &motion, const LoadCallbacks &callbacks) {
+        const MaterialUses &uses = loaded.uses;
+        if (uses.libraries.empty() || uses.runs.empty())
+            path.fail("has no materials; add the key 'material' to the object");
+        std::vector<std::size_t> parts(loaded.mesh.triangles.size(), uses.names.size());
+        for (std::size_t i = 0; i < uses.runs.size(); ++i)
+            std::fill(parts.begin() + static_cast<std::ptrdiff_t>(uses.runs[i].first_triangle),
+                      i + 1 < uses.runs.size()
+                          ? parts.begin() + static_cast<std::ptrdiff_t>(uses.runs[i + 1].first_triangle)
+                          : parts.end(),
+                      uses.runs[i].name);
+        try {
+            const std::filesystem::path file = path.input_path();
+            MtlMaterials materials(builder_, textures_, file, uses, readable_,
+                                   Reporter(callbacks, file.filename().string()));
+            std::vector<TriangleMesh> meshes = split(loaded.mesh, parts, uses.names.size() + 1);
+            for (std::size_t i = 0; i < meshes.size(); ++i) {
+                if (meshes[i].triangles.empty())
+                    continue;
+                const bool is_named = i < uses.names.size();
+                const std::uint32_t material = is_named ? materials.add(uses.names[i]) : materials.add_default();
+                check_texcoords(path, material, !meshes[i].texcoords.empty());
+                builder_.add_object(is_named ? name + "/" + printable(uses.names[i].text) : name,
+                                    builder_.add_triangles(std::move(meshes[i])), material, role, glm::mat4x3(1),
+                                    motion);
+            }
+        } catch (const MeshError &error) {
+            path.fail(error.what());
+        }
+    }
+
     void check_texcoords(const Node &shape, std::uint32_t material_index, bool has_texcoords) const {
         const arhost_material &material = builder_.material(material_index);
         for (const std::uint32_t texture : textures_of(material))
@@ -810,7 +853,7 @@ private:
                                const Transform &world_from_object, std::uint32_t material,
                                const LoadCallbacks &callbacks) {
         if (key == "mesh") {
-            TriangleMesh mesh = mesh_of(node, shape, world_from_object, callbacks);
+            TriangleMesh mesh = mesh_of(node, shape, world_from_object, callbacks).mesh;
             check_texcoords(shape, material, !mesh.texcoords.empty());
             return builder_.add_triangles(std::move(mesh));
         }

@@ -14,7 +14,8 @@ namespace arhost::scene {
 
 // Reads a scene file and its meshes. Throws yaml::Error for errors in the scene file or a mesh; its message names the
 // scene file, line, column and key. Throws Cancelled if the callback requests it.
-// `readable`: files and folders that glTF files may refer to besides their own folder. A scene cannot grant them.
+// `readable`: files and folders that glTF and OBJ files may refer to besides their own folder. A scene cannot grant
+// them.
 ArenaBuilder load_scene(const std::filesystem::path &file, const LoadCallbacks &callbacks = {},
                         const std::vector<std::filesystem::path> &readable = {});
 ArenaBuilder load_scene(const yaml::Node &root, const LoadCallbacks &callbacks = {},

@@ -1,18 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/textures.hpp"
 
+#include "scene/mesh_file.hpp"
+
 namespace arhost::scene {
-namespace {
-
-// Replaces control characters, which `validate` rejects in names.
-std::string printable(std::string text) {
-    for (char &c : text)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-            c = '?';
-    return text;
-}
-
-} // namespace
 
 LoadCallbacks Textures::image_callbacks() const {
     LoadCallbacks callbacks = callbacks_;
@@ -25,18 +16,22 @@ LoadCallbacks Textures::image_callbacks() const {
 
 std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse &use,
                             std::span<const unsigned char> content, const std::string &part) {
-    const std::string name = file.lexically_normal().string() + part;
-    const auto [image, is_new] = images_.try_emplace(name + (use.is_colour ? "\nsRGB" : "\nlinear"));
-    if (is_new) {
-        const LoadCallbacks callbacks = image_callbacks();
-        Image read = read_image(file, content, Reporter(callbacks, file.filename().string()));
-        const arhost_texel_format format = read.is_float   ? ARHOST_TEXEL_RGBA32F
-                                           : use.is_colour ? ARHOST_TEXEL_SRGB8
-                                                           : ARHOST_TEXEL_RGBA8;
-        image->second =
-            builder_.add_image(printable(name), {format, read.width, read.height, std::move(read.texels)});
-    }
-    Texture texture = use.lookup;
+    return add(file.lexically_normal().string() + part, use.is_colour ? "sRGB" : "linear", use.lookup,
+               [&](const LoadCallbacks &callbacks) -> TexelImage {
+                   Image read = read_image(file, content, Reporter(callbacks, file.filename().string()));
+                   const arhost_texel_format format = read.is_float   ? ARHOST_TEXEL_RGBA32F
+                                                      : use.is_colour ? ARHOST_TEXEL_SRGB8
+                                                                      : ARHOST_TEXEL_RGBA8;
+                   return {format, read.width, read.height, std::move(read.texels)};
+               });
+}
+
+std::uint32_t Textures::add(const std::string &name, const char *kind, const Texture &lookup,
+                            const std::function<TexelImage(const LoadCallbacks &)> &make) {
+    const auto [image, is_new] = images_.try_emplace(name + "\n" + kind);
+    if (is_new)
+        image->second = builder_.add_image(printable(name), make(image_callbacks()));
+    Texture texture = lookup;
     texture.image = image->second;
     for (const auto &[known, index] : textures_)
         if (known == texture)

@@ -5,6 +5,7 @@
 
 #include "scene/image.hpp"
 
+#include <functional>
 #include <map>
 
 namespace arhost::scene {
@@ -24,6 +25,10 @@ public:
     std::uint32_t add(const std::filesystem::path &file, const TextureUse &use,
                       std::span<const unsigned char> content = {}, const std::string &part = "");
 
+    // Returns the index of a texture whose image `make` returns. Calls `make` only once for each name and kind.
+    std::uint32_t add(const std::string &name, const char *kind, const Texture &lookup,
+                      const std::function<TexelImage(const LoadCallbacks &)> &make);
+
     // Loads an environment map and computes its cumulative sums. Throws ImageError.
     Environment add_environment(const std::filesystem::path &file);
     // Adds an environment map (RGBA32F) and computes its cumulative sums.
@@ -35,7 +40,7 @@ private:
 
     ArenaBuilder &builder_;
     const LoadCallbacks &callbacks_;
-    std::map<std::string, std::uint32_t> images_; // key: name and encoding
+    std::map<std::string, std::uint32_t> images_; // key: name and kind
     std::vector<std::pair<Texture, std::uint32_t>> textures_;
 };
 

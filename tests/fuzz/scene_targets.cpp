@@ -40,8 +40,14 @@ void load(Bytes bytes, const char *name) {
         MeshOptions options;
         options.byte_limit = std::uint64_t(16) << 20;
         ArenaBuilder builder;
-        const std::uint32_t mesh = builder.add_triangles(load_mesh(write_scratch(name, bytes), options));
-        builder.add_object("mesh", mesh, builder.add_material(make_material(ARHOST_MATERIAL_DIFFUSE)));
+        const std::uint32_t material = builder.add_material(make_material(ARHOST_MATERIAL_DIFFUSE));
+        const MeshWithMaterials loaded = load_mesh_with_materials(write_scratch(name, bytes), options);
+        std::vector<std::size_t> parts(loaded.mesh.triangles.size());
+        for (const MaterialUses::Run &run : loaded.uses.runs)
+            std::fill(parts.begin() + static_cast<std::ptrdiff_t>(run.first_triangle), parts.end(), run.name);
+        for (TriangleMesh &mesh : split(loaded.mesh, parts, loaded.uses.names.size() + 1))
+            if (!mesh.triangles.empty())
+                builder.add_object("mesh", builder.add_triangles(std::move(mesh)), material);
         check(std::move(builder));
     } catch (const MeshError &) {
     }
@@ -55,6 +61,27 @@ void run_obj(Bytes bytes) {
 
 void run_ply(Bytes bytes) {
     load(bytes, "mesh.ply");
+}
+
+void run_stl(Bytes bytes) {
+    load(bytes, "mesh.stl");
+}
+
+void run_mtl(Bytes bytes) {
+    constexpr std::string_view triangle =
+        "mtllib mesh.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 2/1 3/1\n";
+    constexpr std::string_view image = "P5\n2 1\n255\n\1\200";
+    const auto as_bytes = [](std::string_view text) {
+        return Bytes(reinterpret_cast<const std::uint8_t *>(text.data()), text.size());
+    };
+    [[maybe_unused]] static const auto mesh = write_scratch("textured.obj", as_bytes(triangle));
+    [[maybe_unused]] static const auto texture = write_scratch("t.pgm", as_bytes(image));
+    write_scratch("mesh.mtl", bytes);
+    try {
+        check(load_scene(yaml::Node::parse("version: 1\naxes: y-up\nmaterials: {}\nobjects: [{mesh: textured.obj}]\n",
+                                           (scratch() / "scene.yaml").string())));
+    } catch (const yaml::Error &) {
+    }
 }
 
 void run_gltf(Bytes bytes) {

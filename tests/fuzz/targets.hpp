@@ -29,7 +29,9 @@ void run_patt(Bytes);        // a pattern of ARToolKit
 void run_pattern(Bytes);     // input: a pattern, a NUL, a file name
 void run_scene(Bytes);
 void run_obj(Bytes);
+void run_mtl(Bytes);
 void run_ply(Bytes);
+void run_stl(Bytes);
 void run_gltf(Bytes);            // including .glb
 void run_arena(Bytes);           // the output of the scene loader process
 void run_ring(Bytes);            // shared memory that a worker writes
@@ -50,7 +52,9 @@ inline constexpr Target targets[] = {
     {"pattern", run_pattern, 20000},
     {"scene", run_scene, 8000},
     {"obj", run_obj, 15000},
+    {"mtl", run_mtl, 8000},
     {"ply", run_ply, 15000},
+    {"stl", run_stl, 15000},
     {"gltf", run_gltf, 8000},
     {"arena", run_arena, 20000},
     {"ring", run_ring, 20000},

@@ -3,6 +3,7 @@
 
 #include "scene/mesh.hpp"
 #include "scene/mesh_file.hpp"
+#include "scene/referred_files.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -30,23 +31,12 @@ bool is_file(const std::string &file, void *) { // rejects FIFOs, which would bl
 // Input of read_file: how to read the resources (buffers and images) of a glTF file.
 struct Resources {
     const Reporter &reporter;
-    const std::string &gltf;                     // name of the glTF file, for messages
-    std::vector<std::filesystem::path> readable; // resolved files and folders
+    ReferredFiles files;
 };
-
-bool is_below(const std::filesystem::path &file, const std::filesystem::path &folder) {
-    return std::mismatch(folder.begin(), folder.end(), file.begin(), file.end()).first == folder.end();
-}
 
 bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *context) {
     const auto &resources = *static_cast<const Resources *>(context);
-    std::error_code unresolved;
-    const std::filesystem::path resolved = std::filesystem::canonical(file, unresolved);
-    if (!unresolved &&
-        std::ranges::none_of(resources.readable, [&](const auto &folder) { return is_below(resolved, folder); }))
-        throw MeshError(resources.gltf + ": refers to '" + resolved.string() +
-                        "', which is outside its folder; move that file there, or list it under 'reads' of the ray "
-                        "tracer in the configuration");
+    const std::filesystem::path resolved = resources.files.resolve(file);
     resources.reporter.reads(file);
     std::error_code ignored;
     if (is_file(resolved, nullptr) && std::filesystem::file_size(resolved, ignored) <= file_limit)
@@ -152,13 +142,6 @@ Json checked_json(const MeshFile &text) {
 
 } // namespace
 
-std::string printable(std::string text) {
-    for (char &c : text)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-            c = '?';
-    return text.substr(0, 200);
-}
-
 GltfFile read_gltf_file(const std::filesystem::path &file, std::span<const std::filesystem::path> reads,
                         const Reporter &reporter) {
     const MeshFile text = MeshFile::read(file, file_limit - 1, reporter);
@@ -167,8 +150,7 @@ GltfFile read_gltf_file(const std::filesystem::path &file, std::span<const std::
     tinygltf::TinyGLTF parser;
     parser.SetImageLoader(keep_image_bytes, nullptr);
     const std::string folder = file.parent_path().string();
-    Resources resources{reporter, text.name(), {reads.begin(), reads.end()}};
-    resources.readable.push_back(std::filesystem::canonical(folder.empty() ? "." : folder));
+    Resources resources{reporter, ReferredFiles(file, reads)};
     parser.SetFsCallbacks({is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, &resources});
     std::string error, warning;
     const auto size = static_cast<unsigned int>(content_of(text).size());

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "scene/callbacks.hpp"
+#include "scene/mesh_file.hpp"
 
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
@@ -23,8 +24,5 @@ struct GltfFile {
 // MeshError.
 GltfFile read_gltf_file(const std::filesystem::path &file, std::span<const std::filesystem::path> reads,
                         const Reporter &reporter);
-
-// Returns at most 200 bytes of `text` for messages, with '?' for control characters.
-std::string printable(std::string text);
 
 } // namespace arhost::scene

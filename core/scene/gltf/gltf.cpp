@@ -674,10 +674,8 @@ private:
         const std::vector<float> values =
             accessors_.read<float>(accessor, width == 3 ? TINYGLTF_TYPE_VEC3 : TINYGLTF_TYPE_VEC4, "COLOR_0");
         std::vector<glm::u16vec4> colours(values.size() / width, glm::u16vec4(65535));
-        for (std::size_t i = 0; i < values.size(); ++i) {
-            const float value = values[i] > 0 ? std::min(values[i], 1.f) : 0; // NaN becomes 0
-            colours[i / width][static_cast<int>(i % width)] = static_cast<std::uint16_t>(std::lround(value * 65535));
-        }
+        for (std::size_t i = 0; i < values.size(); ++i)
+            colours[i / width][static_cast<int>(i % width)] = colour_channel(static_cast<double>(values[i]));
         return colours;
     }
 

@@ -120,6 +120,22 @@ std::string binary_triangle(bool big_endian) {
     return bytes + "xy";
 }
 
+const std::string ascii_stl = "solid two words\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n"
+                              "   vertex 0 1e0 0\n  endloop\n endfacet\nendsolid two words\n";
+
+// Returns triangles (0, 0, i), (1, 0, i), (0, 1, i).
+std::string binary_stl(std::string header, std::uint32_t count) {
+    header.resize(80, ' ');
+    append(header, count, false);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const auto z = static_cast<float>(i);
+        for (const float value : {0.f, 0.f, -9.f, 0.f, 0.f, z, 1.f, 0.f, z, 0.f, 1.f, z})
+            append(header, value, false);
+        append<std::uint16_t>(header, 0xffff, false);
+    }
+    return header;
+}
+
 } // namespace
 
 TEST(Obj, ReadsTriangles) {
@@ -205,6 +221,37 @@ TEST(Obj, ErrorsNameFileAndLine) {
     expect_errors([&](const std::string &text) { return error_of("a.obj", text); }, cases);
 }
 
+TEST(Obj, ReadsColoursAsSrgb) {
+    const TriangleMesh mesh =
+        load_text("a.obj", "v 0 0 0\nv 1 0 0 1 0.5 0\nv 0 1 0 1\nv 0 2 0 0 2 nan 0.5\nf 1 2 3\nf 1 2 4\n").mesh;
+    // IEC 61966-2-1: 0.5 → 0.2140411
+    EXPECT_THAT(mesh.colours, ElementsAre(glm::u16vec4(65535), glm::u16vec4(65535, 14027, 0, 65535),
+                                          glm::u16vec4(65535), glm::u16vec4(0, 65535, 0, 32768)));
+    EXPECT_EQ(validated(mesh), "");
+    const TriangleMesh joined = load_text("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0 0 0 0\nvt 0 0\nf 3/1 1/1 2/1\n").mesh;
+    EXPECT_THAT(joined.colours, ElementsAre(glm::u16vec4(0, 0, 0, 65535), glm::u16vec4(65535), glm::u16vec4(65535)));
+    EXPECT_TRUE(load_text("a.obj", "v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").mesh.colours.empty());
+}
+
+TEST(Obj, NamesTheMaterialsOfItsTriangles) {
+    const ScratchFolder folder;
+    write_file(folder.path() / "a.obj", "mtllib a b.mtl \n" + three_vertices +
+                                            "f 1 2 3\nusemtl unused\nusemtl  oak wood \nf 1 2 3\nf 1 2 3\n"
+                                            "usemtl #2\nf 1 2 3\nusemtl oak wood\nf 1 2 3\nusemtl end\n");
+    const MaterialUses uses = load_mesh_with_materials(folder.path() / "a.obj").uses;
+    EXPECT_THAT(uses.libraries, ElementsAre("a b.mtl"));
+    ASSERT_EQ(uses.names.size(), 4u);
+    EXPECT_EQ(uses.names[1].text, "oak wood");
+    EXPECT_EQ(uses.names[1].line, 7u);
+    EXPECT_EQ(uses.names[2].text, "#2");
+    EXPECT_EQ(uses.names[3].line, 14u);
+    ASSERT_EQ(uses.runs.size(), 4u);
+    EXPECT_EQ(uses.runs[0].first_triangle, 1u);
+    EXPECT_EQ(uses.runs[0].name, 1u);
+    EXPECT_EQ(uses.runs[1].first_triangle, 3u);
+    EXPECT_EQ(uses.runs[2].name, 1u);
+}
+
 TEST(Polygons, AreTriangulatedWithoutGapsOrOverlaps) {
     // The polygons are a square, a concave arrow head, a U (a triangle fan would cover its gap), and a U with the
     // opposite winding.
@@ -270,6 +317,81 @@ TEST(Ply, ReadsCarriageReturnLineEndings) {
     std::string text = ply_start + ply_triangle_header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     std::replace(text.begin(), text.end(), '\n', '\r');
     EXPECT_EQ(load_text("a.ply", text).mesh.triangles.size(), 1u);
+}
+
+TEST(Ply, LinearisesIntegerColours) {
+    const auto colours_with = [](const std::string &type, const std::string &colour, bool alpha = true) {
+        std::string header = ply_start + "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+        for (const std::string name : {"red", "green", "blue", "alpha"})
+            if (alpha || name != "alpha")
+                header += "property " + type + " " + name + "\n";
+        header += "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+        return load_text("a.ply",
+                         header + "0 0 0 " + colour + "\n1 0 0 " + colour + "\n0 1 0 " + colour + "\n3 0 1 2")
+            .mesh.colours;
+    };
+    // IEC 61966-2-1: 128/255 → 0.2158605
+    EXPECT_THAT(colours_with("uchar", "255 128 0 128"), testing::Each(glm::u16vec4(65535, 14146, 0, 32896)));
+    EXPECT_THAT(colours_with("ushort", "65535 32896 0 32896"), testing::Each(glm::u16vec4(65535, 14146, 0, 32896)));
+    EXPECT_THAT(colours_with("float", "1.5 0.5 -1", false), testing::Each(glm::u16vec4(65535, 32768, 0, 65535)));
+    EXPECT_EQ(colours_with("uchar", "1 2 3", false).size(), 3u);
+    EXPECT_TRUE(load_text("a.ply", binary_triangle(false)).mesh.colours.empty()) << "red alone is no colour";
+}
+
+TEST(Stl, ReadsAsciiAndJoinsVertices) {
+    for (const std::string &text :
+         {ascii_stl + "solid empty\nendsolid\n",
+          "SOLID\r\nFACET NORMAL nan 0 0\r\nOUTER LOOP\r\nVERTEX 0 0 0 VERTEX 1 0 0\r\nVERTEX 0 1 0\r\nENDLOOP "
+          "ENDFACET\r\n" +
+              std::string("ENDSOLID")}) {
+        const TriangleMesh mesh = load_text("a.stl", text).mesh;
+        EXPECT_THAT(mesh.positions, ElementsAre(glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)));
+        EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2)));
+        EXPECT_TRUE(mesh.normals.empty());
+    }
+    std::string classic_mac = ascii_stl;
+    std::ranges::replace(classic_mac, '\n', '\r');
+    EXPECT_EQ(load_text("a.stl", classic_mac).mesh.triangles.size(), 1u);
+    EXPECT_EQ(load_text("a.stl", ascii_stl + ascii_stl).mesh.positions.size(), 3u);
+    EXPECT_THAT(load_text("a.stl", ascii_stl, {true}).mesh.normals, testing::Each(glm::vec3(0, 0, 1)));
+}
+
+TEST(Stl, ReadsBinaryEvenIfItsHeaderBeginsLikeAscii) {
+    for (const std::string header : {"solid exported", "made by hand"}) {
+        const TriangleMesh mesh = load_text("a.stl", binary_stl(header, 2)).mesh;
+        EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(3, 4, 5)));
+        EXPECT_EQ(mesh.positions[4], glm::vec3(1, 0, 1));
+        EXPECT_TRUE(mesh.normals.empty()) << "the normals in the file point to the wrong side";
+        EXPECT_EQ(validated(mesh), "");
+    }
+    EXPECT_EQ(load_text("a.stl.gz", gzipped(binary_stl("", 1))).mesh.triangles.size(), 1u);
+    EXPECT_EQ(load_text("a.stl", binary_stl("", 1) + "rest").mesh.triangles.size(), 1u);
+}
+
+TEST(Stl, ErrorsNameTheLineOrTheByteOffset) {
+    std::string infinite = binary_stl("", 2);
+    std::string infinity;
+    append<float>(infinity, INFINITY, false);
+    infinite.replace(84 + 50 + 12 + 8, 4, infinity);
+    const std::string facet = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n";
+    const arhost::test::ErrorCase cases[] = {
+        {"solid\nendsolid\n", " contains no triangles"},
+        {binary_stl("", 0), " contains no triangles"},
+        {"surface\n", "1: 'solid' is expected here, not 'surface'"},
+        {"solid\nvertex 0 0 0\n", "2: 'facet' or 'endsolid' is expected here, not 'vertex'"},
+        {"solid\nfacet 0 0 1\n", "2: 'normal' is expected here, not '0'"},
+        {facet + "vertex 1 1 0\n", "7: 'endloop' is expected here, not 'vertex'"},
+        {facet + "endloop\n", "8: the file is truncated: 'endfacet' is expected here"},
+        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 x 0\n", "4: a finite number is expected here, not 'x'"},
+        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 inf 0\n", "4: a finite number is expected here, not 'inf'"},
+        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0",
+         "4: the file is truncated: a finite number is expected here"},
+        {binary_stl("", 2).substr(0, 183),
+         " byte 80: the header declares 2 triangles, which need 184 bytes, but the file has 183"},
+        {infinite, " byte 146: triangle 1 has a coordinate that is not finite"},
+    };
+    expect_errors([&](const std::string &text) { return error_of("a.stl", text); }, cases);
+    EXPECT_THAT(error_of("a.stl", ply_start), HasSubstr("has the extension .stl but contains a PLY mesh"));
 }
 
 TEST(Ply, HeaderErrorsNameFileAndLine) {
@@ -385,12 +507,28 @@ TEST(MeshFile, IsRejectedIfItExpandsToAHundredTimesItsSize) {
 
 TEST(MeshFile, IsRejectedIfTheFormatIsUnsupported) {
     EXPECT_EQ(error_of("a.glb", "glTF"), " is a glTF file; name it with the key 'gltf' instead of 'mesh'");
-    EXPECT_EQ(error_of("a.stl", "solid x\n"), " the format '.stl' is unsupported; convert the mesh to .obj or "
-                                              ".ply (optionally compressed: .obj.gz, .ply.gz)");
+    EXPECT_EQ(error_of("a.off", "OFF\n"), " the format '.off' is unsupported; convert the mesh to .obj, .ply or .stl "
+                                          "(optionally compressed: .obj.gz, .ply.gz, .stl.gz)");
     EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr(" the file name has no extension"));
     EXPECT_EQ(error_of("a.obj", "\xff\xfev\0"), " is UTF-16 text; save it as UTF-8 or ASCII");
     EXPECT_EQ(error_of("a.obj", ply_start), " has the extension .obj but contains a PLY mesh; rename it to .ply");
     EXPECT_EQ(error_of("a.obj", ""), " is empty");
+}
+
+TEST(MeshFile, ErrorsNameTheConverterOfOtherFormats) {
+    const std::string assimp = "convert the file with `assimp export a.";
+    for (const std::string extension : {"3mf", "dae", "fbx", "x3d"})
+        EXPECT_EQ(error_of("a." + extension, "x"),
+                  " the format '." + extension + "' is unsupported; " + assimp + extension +
+                      " a.glb -fglb2`, and name the result with the key 'gltf' instead of 'mesh'");
+    for (const std::string extension : {"usd", "usda", "usdc", "USDZ"})
+        EXPECT_THAT(error_of("a." + extension, "x"),
+                    HasSubstr("convert the file with `blender --background --python-expr \"import bpy; "
+                              "bpy.ops.wm.read_factory_settings(use_empty=True); bpy.ops.wm.usd_import(filepath='a." +
+                              extension + "'); bpy.ops.export_scene.gltf(filepath='a.glb')\"`, and"));
+    EXPECT_THAT(error_of("a.blend", "x"),
+                HasSubstr("convert the file with `blender --background a.blend --python-expr \"import bpy; "
+                          "bpy.ops.export_scene.gltf(filepath='a.glb')\"`, and"));
 }
 
 TEST(MeshFile, ReportsWhyItCannotBeRead) {
@@ -504,10 +642,8 @@ TEST_P(LoaderCases, YieldAMeshOrAClearError) {
 }
 
 namespace {
-constexpr char no_stl[] =
-    ": the format '.stl' is unsupported; convert the mesh to .obj or .ply (optionally compressed: .obj.gz, .ply.gz)";
-constexpr char no_mtl[] =
-    ": the format '.mtl' is unsupported; convert the mesh to .obj or .ply (optionally compressed: .obj.gz, .ply.gz)";
+constexpr char no_mtl[] = ": the format '.mtl' is unsupported; convert the mesh to .obj, .ply or .stl (optionally "
+                          "compressed: .obj.gz, .ply.gz, .stl.gz)";
 constexpr char no_faces[] = ": contains no triangles: the header has no element 'face' with a list 'vertex_indices'";
 constexpr char only_lines[] = ": contains no triangles, only points, lines or curves";
 } // namespace
@@ -515,7 +651,7 @@ constexpr char only_lines[] = ": contains no triangles, only points, lines or cu
 INSTANTIATE_TEST_SUITE_P(
     Real, LoaderCases,
     testing::Values(
-        LoaderCase{"Spider_ascii.stl", 0, 0, no_stl}, LoaderCase{"Spider_binary.stl", 0, 0, no_stl},
+        LoaderCase{"Spider_ascii.stl", 1368, 722}, LoaderCase{"Spider_binary.stl", 1368, 722},
         LoaderCase{"Wuson.ply", 3732, 11184}, LoaderCase{"WusonOBJ.obj", 3732, 2117}, LoaderCase{"box.obj", 12, 8},
         LoaderCase{"box_UTF16BE.obj", 0, 0, ": is UTF-16 text; save it as UTF-8 or ASCII"},
         LoaderCase{"box_longline.obj", 944, 8}, LoaderCase{"box_mat_with_spaces.obj", 12, 8},
@@ -532,12 +668,11 @@ INSTANTIATE_TEST_SUITE_P(
         LoaderCase{"point_cloud.obj", 0, 0, ": contains no triangles"}, LoaderCase{"points.ply", 0, 0, no_faces},
         LoaderCase{"regr01.mtl", 0, 0, no_mtl}, LoaderCase{"regr_3429812.mtl", 0, 0, no_mtl},
         LoaderCase{"regr_3429812.obj", 4, 4}, LoaderCase{"space_in_material_name.mtl", 0, 0, no_mtl},
-        LoaderCase{"space_in_material_name.obj", 64, 64}, LoaderCase{"sphereWithHole.stl", 0, 0, no_stl},
+        LoaderCase{"space_in_material_name.obj", 64, 64}, LoaderCase{"sphereWithHole.stl", 285, 146},
         LoaderCase{"spider.mtl", 0, 0, no_mtl}, LoaderCase{"spider.obj", 1368, 974},
         LoaderCase{"testline.obj", 0, 0, only_lines}, LoaderCase{"testmixed.obj", 12, 8},
-        LoaderCase{"testpoints.obj", 0, 0, only_lines}, LoaderCase{"triangle.stl", 0, 0, no_stl},
-        LoaderCase{"triangle_with_empty_solid.stl", 0, 0, no_stl},
-        LoaderCase{"triangle_with_two_solids.stl", 0, 0, no_stl}));
+        LoaderCase{"testpoints.obj", 0, 0, only_lines}, LoaderCase{"triangle.stl", 1, 3},
+        LoaderCase{"triangle_with_empty_solid.stl", 1, 3}, LoaderCase{"triangle_with_two_solids.stl", 2, 6}));
 
 TEST(LoaderCaseTable, CoversEveryFileInTheFolder) {
     ARHOST_REQUIRE_SHARED_DATA("meshes/loader_cases");
@@ -554,6 +689,8 @@ TEST(MeshMutations, YieldAMeshOrAnError) {
         {"a.ply", ply_start + ply_triangle_header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"},
         {"b.ply", binary_triangle(false)},
         {"c.ply", binary_triangle(true)},
+        {"a.stl", ascii_stl},
+        {"b.stl", binary_stl("solid", 2)},
         {"a.obj.gz", gzipped(three_vertices + "f 1 2 3\n")}};
     std::mt19937 random(7);
     // The folder is in memory, which makes writing thousands of files fast.
