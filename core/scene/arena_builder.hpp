@@ -205,6 +205,7 @@ public:
     std::size_t object_count() const { return objects_.size(); }
     std::size_t triangle_count() const;
     const arhost_material &material(std::uint32_t index) const { return materials_[index]; }
+    arhost_material &material(std::uint32_t index) { return materials_[index]; }
     const TexelImage &image_of_texture(std::uint32_t index) const { return images_[textures_[index].image].second; }
     const Texture &texture(std::uint32_t index) const { return textures_[index]; }
 

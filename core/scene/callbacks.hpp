@@ -40,6 +40,10 @@ public:
         if (callbacks_.info)
             callbacks_.info(text);
     }
+    void warning(const std::string &text) const {
+        if (callbacks_.warning)
+            callbacks_.warning(text);
+    }
     void reads(const std::filesystem::path &file) const {
         if (callbacks_.reads)
             callbacks_.reads(file);

@@ -567,9 +567,26 @@ TriangleMesh stand_in_of(const Node &node, const MeshOptions &options) {
     return mesh;
 }
 
+Fit fit_of(const Node &object) {
+    Fit fit;
+    const auto unit = object.find("unit"), size = object.find("fit_mm"), place = object.find("place");
+    if (unit && size)
+        size->fail("cannot be combined with 'unit'; remove one of them");
+    if (unit) {
+        const std::string text = unit->choice({"mm", "cm", "m", "in"});
+        fit.mm_per_unit = text == "mm" ? 1 : text == "cm" ? 10 : text == "m" ? 1000 : 25.4;
+    }
+    if (size)
+        fit.largest_side_mm = size->real(1e-3, coordinate_limit_mm);
+    if (place)
+        fit.place =
+            place->choice({"on_ground", "centred"}) == "centred" ? Fit::Place::centred : Fit::Place::on_ground;
+    return fit;
+}
+
 // Returns the mesh without materials if the object has its own.
-MeshWithMaterials mesh_of(const Node &object, const Node &path, const Transform &world_from_object,
-                          const LoadCallbacks &callbacks) {
+MeshWithMaterials mesh_of(const Node &object, const Node &path, const glm::dvec3 &up,
+                          const Transform &world_from_object, const LoadCallbacks &callbacks) {
     MeshOptions options;
     if (const auto smooth = object.find("smooth"))
         options.smooth = smooth->boolean();
@@ -589,7 +606,8 @@ MeshWithMaterials mesh_of(const Node &object, const Node &path, const Transform 
         else
             loaded = load_mesh_with_materials(path.input_path(), options, callbacks);
         TriangleMesh &mesh = loaded.mesh;
-        world_from_object.apply(mesh);
+        const Box box = box_of(std::span<const glm::vec3>(mesh.positions));
+        (world_from_object * fit_of(object).transform(box, up)).apply(mesh);
         check_extent(path, mesh.positions);
         if (std::ranges::any_of(mesh.texcoords, [](const glm::vec2 &t) {
                 return std::abs(t.x) > coordinate_limit_mm || std::abs(t.y) > coordinate_limit_mm;
@@ -599,6 +617,11 @@ MeshWithMaterials mesh_of(const Node &object, const Node &path, const Transform 
             callbacks.info(path.input_path().string() + (missing ? " (stand-in): " : ": ") +
                            std::to_string(mesh.triangles.size()) + " triangles, " +
                            std::to_string(mesh.positions.size()) + " vertices, " + extent_of(mesh));
+        const auto role = object.find("role");
+        const Box placed = box_of(std::span<const glm::vec3>(mesh.positions));
+        if (!role && !object.find("on") && !object.find("motion") && callbacks.warning)
+            if (const std::string warning = placement_warning(placed, up); !warning.empty())
+                callbacks.warning(path.input_path().string() + ": " + warning);
         return loaded;
     } catch (const MeshError &error) {
         path.fail(error.what());
@@ -651,13 +674,17 @@ private:
     void set_origin(const Node &node) { builder_.set_origin(node.where() + ": " + node.path()); }
 
     void add_object(const Node &node, std::size_t index, std::size_t count) {
-        node.allow_keys({"name", "mesh", "gltf", "animation", "loop", "speed", "variant", "smooth", "stand_in",
-                         "sphere", "cuboid", "plane", "transform", "motion", "material", "role", "on"});
+        node.allow_keys({"name",   "mesh",      "gltf",   "animation", "loop",  "speed", "variant",
+                         "smooth", "stand_in",  "sphere", "cuboid",    "plane", "unit",  "fit_mm",
+                         "place",  "transform", "motion", "material",  "role",  "on"});
         const std::string shape_key = shape_key_of(node);
         const Node shape = node.require(shape_key);
         for (const char *key : {"smooth", "stand_in"})
             if (const auto of_mesh = node.find(key); of_mesh && shape_key != "mesh")
                 of_mesh->fail("is only allowed with 'mesh'");
+        for (const char *key : {"unit", "fit_mm", "place"})
+            if (const auto of_model = node.find(key); of_model && shape_key != "gltf" && shape_key != "mesh")
+                of_model->fail("is only allowed with 'gltf' and 'mesh'");
         for (const char *key : {"variant", "loop", "speed"})
             if (const auto of_gltf = node.find(key); of_gltf && shape_key != "gltf")
                 of_gltf->fail("is only allowed with 'gltf'");
@@ -685,7 +712,9 @@ private:
                 builder_.settings.axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
             add_gltf_file(node, shape,
                           {.name = name,
-                           .from_gltf = world_from_object * to_scene_axes,
+                           .axes_from_gltf = to_scene_axes,
+                           .fit = fit_of(node),
+                           .placed = world_from_object,
                            .node = motion_node,
                            .role = role,
                            .material = material,
@@ -698,7 +727,8 @@ private:
                     add_geometry(node, shape_key, shape, world_from_object, *material, part);
                 builder_.add_object(name, geometry, *material, role, glm::mat4x3(1), motion);
             } else {
-                add_parts(name, shape, mesh_of(node, shape, world_from_object, part), role, motion, part);
+                add_parts(name, shape, mesh_of(node, shape, up_of(builder_.settings.axes), world_from_object, part),
+                          role, motion, part);
             }
         }
         Reporter(part, name).report(1);
@@ -853,7 +883,8 @@ private:
                                const Transform &world_from_object, std::uint32_t material,
                                const LoadCallbacks &callbacks) {
         if (key == "mesh") {
-            TriangleMesh mesh = mesh_of(node, shape, world_from_object, callbacks).mesh;
+            TriangleMesh mesh =
+                mesh_of(node, shape, up_of(builder_.settings.axes), world_from_object, callbacks).mesh;
             check_texcoords(shape, material, !mesh.texcoords.empty());
             return builder_.add_triangles(std::move(mesh));
         }

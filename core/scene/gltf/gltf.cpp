@@ -16,6 +16,7 @@
 #include <cstring>
 #include <map>
 #include <set>
+#include <span>
 
 namespace arhost::scene {
 namespace {
@@ -44,8 +45,7 @@ public:
         : builder_(builder), name_(file.string()), placement_(placement),
           reporter_(callbacks, file.filename().string()), content_(read_gltf_file(file, placement.reads, reporter_)),
           model_(content_.model), accessors_(model_, name_),
-          materials_(builder, textures, file, name_, content_, accessors_,
-                     std::cbrt(std::abs(glm::determinant(glm::dmat3(placement.from_gltf.matrix()))))) {}
+          materials_(builder, textures, file, name_, content_, accessors_) {}
 
     float load() {
         check_extensions();
@@ -59,6 +59,8 @@ public:
         }
         if (parts_.empty())
             accessors_.fail("its default scene contains no triangles");
+        find_deforming_parts();
+        place();
         bake_static_deformations();
         if (!animations_.empty())
             add_motion();
@@ -72,9 +74,10 @@ private:
     struct SceneNode {
         int file_node;                      // index of the node in the file
         std::uint32_t parent = ARHOST_NONE; // index in nodes_
-        glm::dmat4 placement_from_node{1};  // in the rest pose, relative to placement_.node
-        bool has_channel = false;           // the animation changes its translation, rotation or scale
-        bool moves = false;                 // the animation moves this node or an ancestor
+        glm::dmat4 placement_from_node{
+            1};                   // in the rest pose, relative to placement_.node; before place(), to the axes
+        bool has_channel = false; // the animation changes its translation, rotation or scale
+        bool moves = false;       // the animation moves this node or an ancestor
         bool has_weights_channel = false;
         std::vector<float> morph_weights;
     };
@@ -109,7 +112,9 @@ private:
                 std::string(table) + "[" + std::to_string(index) + "]", name_};
     }
 
-    void check_extensions() const {
+    void check_extensions() {
+        if (!model_.cameras.empty())
+            notice("cameras are ignored; the tracker is the camera");
         std::string ignored;
         for (const std::string &extension : model_.extensionsUsed)
             if (!is_supported(extension))
@@ -142,7 +147,7 @@ private:
                 pending.emplace_back(*node, ARHOST_NONE);
         }
         scene_index_.assign(model_.nodes.size(), ARHOST_NONE);
-        const glm::dmat4 root = placement_.from_gltf.matrix();
+        const glm::dmat4 root = placement_.axes_from_gltf.matrix();
         while (!pending.empty()) {
             const auto [index, parent] = pending.back();
             pending.pop_back();
@@ -352,7 +357,7 @@ private:
     void add_motion() {
         MotionNode root;
         root.parent = placement_.node;
-        root.parent_from_node = glm::dmat4x3(placement_.from_gltf.matrix());
+        root.parent_from_node = glm::dmat4x3((placed_ * placement_.axes_from_gltf).matrix());
         const std::uint32_t root_index = builder_.add_node(root);
         first_node_ = root_index + 1;
         for (const SceneNode &node : nodes_) {
@@ -740,44 +745,42 @@ private:
         }
     }
 
-    // Applies skins and morph targets that are not animated to the vertices, in the rest pose.
-    void bake_static_deformations() {
-        ArenaBuilder at_rest; // temporary scene: the code that evaluates animations computes the rest pose
-        at_rest.settings.duration_s = 1;
-        for (const SceneNode &node : nodes_) {
-            MotionNode world_node;
-            world_node.parent_from_node = glm::dmat4x3(node.placement_from_node);
-            world_node.morph_weights = node.morph_weights;
-            at_rest.add_node(std::move(world_node));
-        }
-        std::vector<Part *> resting;
+    void find_deforming_parts() {
         for (Part &part : parts_) {
             const SceneNode &node = nodes_[part.node];
-            const bool morphs = !part.mesh.morph_positions.empty();
-            if (part.skin < 0 && !morphs)
-                continue;
-            Skin skin;
             if (part.skin >= 0) {
-                skin = skin_of(part.skin, 0);
+                const Skin skin = skin_of(part.skin, 0);
                 for (std::size_t v = 0; v < part.mesh.joints.size(); ++v)
                     for (int i = 0; i < 4; ++i)
                         if (part.mesh.joints[v][i] >= skin.joints.size())
                             accessors_.fail("a vertex refers to joint " + std::to_string(part.mesh.joints[v][i]) +
                                             ", but the skin has only " + std::to_string(skin.joints.size()) +
                                             " joints");
+                part.deforms = std::ranges::any_of(skin.joints, [&](std::uint32_t j) { return nodes_[j].moves; });
             }
-            part.deforms = (morphs && node.has_weights_channel) ||
-                           std::ranges::any_of(skin.joints, [&](std::uint32_t j) { return nodes_[j].moves; });
-            if (part.deforms)
-                continue;
-            const std::uint32_t skin_index = part.skin < 0 ? ARHOST_NONE : at_rest.add_skin(std::move(skin));
-            at_rest.add_object("", at_rest.add_triangles(std::move(part.mesh)), 0, ARHOST_ROLE_VIRTUAL,
-                               glm::mat4x3(1), {false, true, part.node, skin_index});
-            resting.push_back(&part);
+            part.deforms |= !part.mesh.morph_positions.empty() && node.has_weights_channel;
         }
-        if (resting.empty())
-            return;
-        const Arena arena = std::move(at_rest).build();
+    }
+
+    static bool is_deformed(const Part &part) { return part.skin >= 0 || !part.mesh.morph_positions.empty(); }
+
+    // Returns the meshes of parts that are deformed, in the rest pose. Skinned meshes are relative to
+    // placement_.node.
+    std::vector<TriangleMesh> at_rest(std::span<Part *const> parts) const {
+        ArenaBuilder builder; // temporary scene: the code that evaluates animations computes the rest pose
+        builder.settings.duration_s = 1;
+        for (const SceneNode &node : nodes_) {
+            MotionNode world_node;
+            world_node.parent_from_node = glm::dmat4x3(node.placement_from_node);
+            world_node.morph_weights = node.morph_weights;
+            builder.add_node(std::move(world_node));
+        }
+        for (const Part *part : parts) {
+            const std::uint32_t skin = part->skin < 0 ? ARHOST_NONE : builder.add_skin(skin_of(part->skin, 0));
+            builder.add_object("", builder.add_triangles(part->mesh), 0, ARHOST_ROLE_VIRTUAL, glm::mat4x3(1),
+                               {false, true, part->node, skin});
+        }
+        const Arena arena = std::move(builder).build();
         const auto at = [&]<class T>(const arhost_buffer &buffer, T) {
             const T *from = reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
             return std::vector<T>(from, from + buffer.count);
@@ -785,9 +788,9 @@ private:
         MotionEvaluator evaluator(arena.scene());
         const arhost_motion motion = evaluator.at(0);
         const auto geometries = at(arena.scene().geometries, arhost_geometry());
-        for (std::size_t i = 0; i < resting.size(); ++i) {
-            TriangleMesh &mesh = resting[i]->mesh;
-            mesh = {};
+        std::vector<TriangleMesh> meshes(parts.size());
+        for (std::size_t i = 0; i < parts.size(); ++i) {
+            TriangleMesh &mesh = meshes[i];
             mesh.triangles = at(geometries[i].indices, glm::uvec3());
             mesh.texcoords = at(geometries[i].texcoords, glm::vec2());
             mesh.colours = at(geometries[i].colours, glm::u16vec4());
@@ -797,6 +800,52 @@ private:
             if (normals)
                 mesh.normals.assign(normals, normals + motion.deformed[i].vertex_count);
         }
+        return meshes;
+    }
+
+    // Returns the bounding box in the rest pose.
+    Box box_at_rest() {
+        Box box;
+        for (Part &part : parts_) {
+            const bool deformed = is_deformed(part);
+            Part *const parts[] = {&part};
+            const std::vector<TriangleMesh> posed = deformed ? at_rest(parts) : std::vector<TriangleMesh>();
+            const Transform from_mesh = Transform::of(nodes_[part.node].placement_from_node *
+                                                      part.node_from_instance.value_or(glm::dmat4(1)));
+            const auto include = [&](const glm::vec3 &p) {
+                box.include(part.skin >= 0 ? p : glm::vec3(from_mesh(p)));
+            };
+            if (part.shared) {
+                const glm::mat4x3 matrix(from_mesh.matrix());
+                box.include(transformed(glm::value_ptr(matrix), part.shared->box));
+            } else {
+                std::ranges::for_each(deformed ? posed.front().positions : part.mesh.positions, include);
+            }
+        }
+        return box;
+    }
+
+    // Fits and places the model.
+    void place() {
+        placed_ =
+            placement_.placed * placement_.fit.transform(placement_.fit.needs_box() ? box_at_rest() : Box(), up());
+        for (SceneNode &node : nodes_)
+            node.placement_from_node = placed_.matrix() * node.placement_from_node;
+        if (!placement_.material)
+            materials_.scale_volumes(std::cbrt(std::abs(glm::determinant(glm::dmat3(placed_.matrix())))));
+    }
+
+    // Applies skins and morph targets that are not animated to the vertices, in the rest pose.
+    void bake_static_deformations() {
+        std::vector<Part *> resting;
+        for (Part &part : parts_)
+            if (is_deformed(part) && !part.deforms)
+                resting.push_back(&part);
+        if (resting.empty())
+            return;
+        std::vector<TriangleMesh> meshes = at_rest(resting);
+        for (std::size_t i = 0; i < resting.size(); ++i)
+            resting[i]->mesh = std::move(meshes[i]);
     }
 
     void add_object(Part &part) {
@@ -808,7 +857,7 @@ private:
         triangles_ += part.mesh.triangles.size();
         vertices_ += part.mesh.positions.size();
         const Transform from_mesh = Transform::of(node.placement_from_node);
-        const bool mirrored = glm::determinant(placement_.from_gltf.matrix()) < 0;
+        const bool mirrored = glm::determinant(placed_.matrix()) < 0;
         if (part.deforms && part.skin >= 0) {
             if (mirrored) // skinned vertices are in world space, so mirroring flips the winding
                 for (glm::uvec3 &t : part.mesh.triangles)
@@ -879,7 +928,12 @@ private:
             std::snprintf(text, sizeof text, ": %zu triangles, %zu vertices, deformed by an animation", triangles_,
                           vertices_);
         reporter_.info(name_ + text);
+        if (placement_.role == ARHOST_ROLE_VIRTUAL && placement_.node == ARHOST_NONE && box_.min.x <= box_.max.x)
+            if (const std::string warning = placement_warning(box_, up()); !warning.empty())
+                reporter_.warning(name_ + ": " + warning);
     }
+
+    glm::dvec3 up() const { return glm::round(glm::dvec3(placement_.axes_from_gltf.matrix()[1])); } // glTF's y axis
 
     ArenaBuilder &builder_;
     const std::string name_;
@@ -900,8 +954,9 @@ private:
     std::uint32_t first_node_ = 0; // arena index of nodes_[0]
     std::vector<Part> parts_;
     std::map<int, std::uint32_t> skins_; // index in the file → index in the arena
+    Transform placed_;                   // of the axes to the coordinates of placement_.node
     std::size_t triangles_ = 0, vertices_ = 0;
-    Box box_;
+    Box box_; // of what does not deform
 };
 
 } // namespace

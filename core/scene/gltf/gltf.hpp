@@ -5,6 +5,7 @@
 
 #include "scene/arena_builder.hpp"
 #include "scene/callbacks.hpp"
+#include "scene/fit.hpp"
 #include "scene/mesh.hpp"
 #include "scene/shapes.hpp"
 #include "scene/textures.hpp"
@@ -26,8 +27,10 @@ public:
 };
 
 struct GltfPlacement {
-    std::string name;                 // objects are named "name/node"
-    Transform from_gltf;              // transforms glTF coordinates to those of `node`
+    std::string name;         // objects are named "name/node"
+    Transform axes_from_gltf; // the axes of the scene, in the unit of the file
+    Fit fit{};
+    Transform placed{};               // of the fitted model, to the coordinates of `node`
     std::uint32_t node = ARHOST_NONE; // the parent node, or ARHOST_NONE for the world
     arhost_role role = ARHOST_ROLE_VIRTUAL;
     std::optional<std::uint32_t> material; // index of a material that replaces all materials of the file

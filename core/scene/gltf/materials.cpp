@@ -136,10 +136,16 @@ void GltfMaterials::read_transmission(const JsonNode &node, arhost_material &mat
     if (const auto distance = volume->find("attenuationDistance"))
         for (std::size_t i = 0; i < 3; ++i) {
             const double least = 1e-6; // a colour of 0 would be opaque
-            const double length = std::max(distance->number(0, largest_number) * scale_, least);
+            const double length = std::max(double{distance->number(0, largest_number)}, least);
             material.extinction[i] = static_cast<float>(
                 std::clamp(-std::log(std::max(double{colour[i]}, least)) / length, 0.0, double{extinction_limit}));
         }
+}
+
+void GltfMaterials::scale_volumes(double scale) {
+    for (const auto &[index, material] : known_)
+        for (float &extinction : builder_.material(material.index).extinction)
+            extinction = static_cast<float>(std::min(extinction / scale, double{extinction_limit}));
 }
 
 void GltfMaterials::read_clearcoat(const JsonNode &node, arhost_material &material) {

@@ -15,11 +15,11 @@ namespace arhost::scene {
 
 class GltfMaterials {
 public:
-    // The arguments must outlive this object. `name`: of the file, for messages. `scale`: of the file's lengths.
+    // The arguments must outlive this object. `name`: of the file, for messages.
     GltfMaterials(ArenaBuilder &builder, Textures &textures, const std::filesystem::path &file,
-                  const std::string &name, const GltfFile &content, const Accessors &accessors, double scale)
-        : builder_(builder), textures_(textures), file_(file), name_(name), content_(content), accessors_(accessors),
-          scale_(scale) {}
+                  const std::string &name, const GltfFile &content, const Accessors &accessors)
+        : builder_(builder), textures_(textures), file_(file), name_(name), content_(content), accessors_(accessors) {
+    }
 
     struct Material {
         std::uint32_t index; // in the arena
@@ -27,6 +27,9 @@ public:
     };
     // Returns a material of the file, or for −1 the default material. Adds it to the arena at the first call.
     const Material &at(int index);
+
+    // Adapts volumes to a scale of the file's lengths. Call it once, after the last call of at().
+    void scale_volumes(double scale);
 
 private:
     Material read(const JsonNode &node);
@@ -43,7 +46,6 @@ private:
     const std::string &name_;
     const GltfFile &content_;
     const Accessors &accessors_;
-    const double scale_;
     std::map<int, Material> known_; // key: index in the file
 };
 

@@ -160,6 +160,50 @@ TEST(Gltf, TransformsStaticMeshesToWorldSpace) {
     EXPECT_THAT(loaded.info, testing::Contains(HasSubstr("a.gltf: 1 triangles, 3 vertices, 2 x 2 x 0 mm")));
 }
 
+TEST(Gltf, FitsAndPlacesModels) {
+    const auto corner = [](const std::string &object, const std::string &axes = "z-up") {
+        const Loaded loaded = load(triangle().text(), object, axes);
+        const std::vector<float> p = vertex(loaded.arena, 2);
+        return glm::vec3(p[0], p[1], p[2]);
+    };
+    const auto is = [](const glm::vec3 &p, const glm::vec3 &expected) {
+        EXPECT_LT(glm::distance(p, expected), 1e-4f);
+    };
+    // The triangle has the corners (0, 0, 0), (1, 0, 0) and (0, 1, 0); its y is up.
+    is(corner(", unit: m"), {0, 0, 1000});
+    is(corner(", fit_mm: 80"), {0, 0, 80});
+    is(corner(", fit_mm: 80, place: on_ground"), {-40, 0, 80});
+    is(corner(", fit_mm: 80, place: centred"), {-40, 0, 40});
+    is(corner(", unit: cm, place: centred, transform: [{translate: [1, 2, 3]}]"), {-4, 2, 8});
+    is(corner(", fit_mm: 80, place: on_ground", "y-up"), {-40, 80, 0});
+    EXPECT_THAT(error_of(triangle().text(), ", unit: m, fit_mm: 3"),
+                HasSubstr("objects[0].fit_mm: cannot be combined"));
+    const Loaded skin = load(skinned().text(), ", animation: wave, fit_mm: 50, place: on_ground");
+    MotionEvaluator evaluator(skin.arena.scene());
+    const float *p = evaluator.at(0).deformed[0].positions;
+    EXPECT_THAT(std::vector<float>(p, p + 9), ElementsAre(-25, 0, 0, 25, 0, 0, -25, 50, 0)) << "in the rest pose";
+}
+
+TEST(Gltf, WarnsOfUnlikelySizesAndModelsBelowTheGround) {
+    const auto warning = [](const std::string &object) {
+        const ScratchFolder folder;
+        write_file(folder.path() / "a.gltf", triangle().text());
+        write_file(folder.path() / "s.yaml",
+                   "version: 1\naxes: y-up\nmaterials: {}\nobjects:\n  - {gltf: a.gltf" + object + "}\n");
+        LoadCallbacks callbacks;
+        std::string warning = "none";
+        callbacks.warning = [&](const std::string &text) { warning = text; };
+        load_scene(folder.path() / "s.yaml", callbacks);
+        return warning;
+    };
+    EXPECT_THAT(warning(""), HasSubstr("a.gltf: is only 1 mm large; if its unit is not mm, add 'unit: m'"));
+    EXPECT_THAT(warning(", transform: [{scale: 6000}]"), HasSubstr("a.gltf: is 6 m large; set its size"));
+    EXPECT_THAT(warning(", fit_mm: 80, transform: [{translate: [0, -100, 0]}]"),
+                HasSubstr("is below the ground: its highest point is at -20 mm; add 'place: on_ground'"));
+    EXPECT_EQ(warning(", fit_mm: 80"), "none");
+    EXPECT_EQ(warning(", role: occluder"), "none");
+}
+
 TEST(Gltf, ConvertsItsUpAxisInZUpScenes) {
     const Loaded loaded = load(triangle().text(), "", "z-up");
     EXPECT_THAT(vertex(loaded.arena, 2), ElementsAre(near(0), near(0), near(1))) << "its y is up";

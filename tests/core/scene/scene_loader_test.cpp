@@ -580,7 +580,8 @@ TEST(SceneLoading, PrefersTheMeshToItsStandIn) {
     LoadCallbacks callbacks;
     callbacks.warning = [](const std::string &text) { ADD_FAILURE() << text; };
     EXPECT_EQ(
-        geometry(load_with_mesh(triangle_with_normals, ", stand_in: {faces: 500, size: 1}", callbacks)).indices.count,
+        geometry(load_with_mesh(triangle_with_normals, ", fit_mm: 9, stand_in: {faces: 500, size: 1}", callbacks))
+            .indices.count,
         1u);
 }
 
