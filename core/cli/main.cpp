@@ -104,6 +104,7 @@ constexpr struct {
     {"conform", "Test whether a plugin conforms to the ABI (docs/conformance.md)"},
     {"marker", "Print markers and boards in their true size (docs/markers.md)"},
     {"calibrate", "Calibrate a camera with a printed board (docs/calibration.md)"},
+    {"place", "Put a model on a marker: write a scene and a configuration, and run them"},
     {"map", "Learn where markers are relative to each other, from images (docs/maps.md)"},
 };
 

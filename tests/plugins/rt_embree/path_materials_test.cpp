@@ -8,7 +8,7 @@
 #include <array>
 #include <cmath>
 
-namespace arhost::test {
+namespace arhost::test::path_materials {
 namespace {
 
 constexpr std::size_t transmittance = 4;
@@ -162,8 +162,13 @@ TEST(PathMaterials, UnlitSurfacesHaveTheirColourUnderAnyLight) {
 
 TEST(PathMaterials, SolidsInAFurnaceAreInvisible) {
     for (const float share : {1.0f, 0.5f}) {
-        SceneBuilder scene = in_a_furnace(1, 32);
-        scene.add_ball("ball", {0, 0, 0, 40}, transmissive(false, share));
+        SceneBuilder scene = in_a_furnace(1, 64);
+        arhost_material material = transmissive(false, share);
+        if (share < 1) { // Lambert's part: the model of glTF brings energy at grazing angles
+            material.index = 1;
+            material.specular_weight = 0;
+        }
+        scene.add_ball("ball", {0, 0, 0, 40}, material);
         const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "256"}});
         EXPECT_NEAR(mean_at(picture, 100, 75), 1, 0.01) << share;
     }
@@ -184,15 +189,15 @@ TEST(PathMaterials, SolidsAbsorbAndTintAtEachSurface) {
 
 // A thin wall neither refracts nor absorbs, and its colour tints the light once.
 TEST(PathMaterials, ThinWallsPassLightStraight) {
-    for (const float roughness : {0.0f, 0.5f}) {
+    for (const float roughness : {0.0f, 0.2f}) {
         SceneBuilder scene = in_a_furnace(1);
         arhost_material wall = transmissive(true, 1, roughness);
         set3(wall.diffuse, 1, 0.5f, 1);
         set3(wall.extinction, 1, 1, 1);
         scene.add_mesh("wall", square(60), wall);
         const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "256"}});
-        EXPECT_NEAR(mean_at(picture, 100, 75, 0), 1, roughness > 0 ? 0.03 : 0.002) << roughness;
-        EXPECT_NEAR(mean_at(picture, 100, 75, 1), 0.04 + 0.96 * 0.5, roughness > 0 ? 0.03 : 0.005) << roughness;
+        EXPECT_NEAR(mean_at(picture, 100, 75, 0), 1, roughness > 0 ? 0.01 : 0.002) << roughness;
+        EXPECT_NEAR(mean_at(picture, 100, 75, 1), 0.04 + 0.96 * 0.5, roughness > 0 ? 0.01 : 0.005) << roughness;
     }
 }
 
@@ -236,4 +241,4 @@ TEST(PathMaterials, IndexAndSpecularWeightSetTheReflectanceOfNonMetals) {
     EXPECT_NEAR(reflected(1.5f, 1, 100), 1, 0.01) << "at most 1";
 }
 
-} // namespace arhost::test
+} // namespace arhost::test::path_materials
