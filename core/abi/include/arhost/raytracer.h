@@ -36,7 +36,7 @@ typedef uint64_t arhost_raytracer_capabilities;
  * they are at time 0. The worker then warns the user. If an incomplete image is useless, `start` may reject the scene
  * with ARHOST_STATUS_ERROR_UNSUPPORTED. */
 #define ARHOST_RAYTRACER_CAPABILITY_REFLECTION 0x100ull   /* the materials SPECULAR, MIRROR and METAL */
-#define ARHOST_RAYTRACER_CAPABILITY_GLASS 0x200ull        /* the material GLASS */
+#define ARHOST_RAYTRACER_CAPABILITY_GLASS 0x200ull        /* GLASS, and METALLIC_ROUGHNESS with transmission */
 #define ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS 0x400ull    /* METALLIC_ROUGHNESS, and rough GLASS */
 #define ARHOST_RAYTRACER_CAPABILITY_TEXTURES 0x800ull     /* textures of materials */
 #define ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS 0x1000ull /* rectangles and spheres */
