@@ -42,7 +42,7 @@ int main(int argc, char **argv) {
                                           "(docs/scenes.md)",
                                           "arhost place");
     arhost::place::Placement placement;
-    std::string model, camera, output, name;
+    std::string model, camera, output, name, size;
     bool only_writes = false, replaces = false;
     app.option("FILE", model, "The model: glTF, OBJ, PLY or STL").required();
     app.option("--on", placement.target, "The marker, such as tag36h11:23, or a pattern file")
@@ -55,6 +55,13 @@ int main(int argc, char **argv) {
         .range(1e-3, 1e6);
     app.option("--source", placement.source, "Camera, URL, film or pictures").show_default();
     app.option("--camera", camera, "Calibration of the camera (docs/calibration.md)").type_name("FILE");
+    app.option("--size", size, "Size of the calibration's images in px, if its file does not contain it")
+        .type_name("WIDTHxHEIGHT")
+        .check([&](const std::string &text) {
+            char rest = 0;
+            const bool good = std::sscanf(text.c_str(), "%ux%u%c", &placement.width, &placement.height, &rest) == 2;
+            return good ? "" : text + ": must be WIDTHxHEIGHT, such as 640x480";
+        });
     app.option("--output", output, "Film or picture (default: a window)").type_name("FILE");
     app.option("--animation", placement.animation, "Name or index of an animation of a glTF file, or all");
     app.option("--variant", placement.variant, "Name of a variant of a glTF file");

@@ -32,9 +32,11 @@ std::string number(double value) {
     return text.str();
 }
 
-// Returns `file` as the text in `from` names it.
+// Returns `file` as the text in `from` names it: relative if it is below the same folder or that above.
 std::string named_in(const fs::path &from, const fs::path &file) {
-    return quoted(fs::relative(file, fs::absolute(from).parent_path()).string());
+    const fs::path absolute = fs::absolute(file).lexically_normal(),
+                   relative = absolute.lexically_relative(fs::absolute(from).parent_path());
+    return quoted(relative.empty() || relative.string().starts_with("../..") ? absolute : relative);
 }
 
 std::string extension_of(const fs::path &file) {
@@ -124,10 +126,14 @@ std::string configuration_text(const Placement &placement, const fs::path &scene
     if (placement.camera.empty() && !is_camera)
         throw base::InvalidInput("--camera is missing: the calibration of the camera that took " + placement.source +
                                  "; `arhost calibrate` measures it (docs/calibration.md)");
-    const std::string camera = placement.camera.empty()
-                                   ? "camera: {width: 640, height: 480, fx: 600, fy: 600} # a typical webcam; "
-                                     "measure yours: docs/calibration.md\n"
-                                   : "camera: {file: " + named_in(configuration, placement.camera) + "}\n";
+    const std::string camera =
+        placement.camera.empty() ? "camera: {width: 640, height: 480, fx: 600, fy: 600} # a typical webcam; "
+                                   "measure yours: docs/calibration.md\n"
+                                 : "camera: {file: " + named_in(configuration, placement.camera) +
+                                       (placement.width == 0 ? ""
+                                                             : ", width: " + std::to_string(placement.width) +
+                                                                   ", height: " + std::to_string(placement.height)) +
+                                       "}\n";
     return "# Written by `" + placement.command_line + "`. Format: docs/config.md.\n" + "version: 1\n" +
            (is_camera ? "mode: live\nlive: {target_fps: 25}\n" : "mode: lockstep\n") +
            source_text(placement, configuration) + camera + tracker_text(placement, configuration) +

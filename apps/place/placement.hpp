@@ -17,6 +17,7 @@ struct Placement {
     std::optional<double> fit_mm;       // largest side of the model; absent: side_mm
     std::string source = "/dev/video0"; // a device, a URL, or a file
     std::filesystem::path camera;       // calibration; empty: that of a typical webcam
+    unsigned width = 0, height = 0;     // px, of the images of the calibration; 0: as in its file
     std::filesystem::path output;       // empty: a window
     std::string animation, variant;     // empty: none
     std::string raytracer = "rt_embree";

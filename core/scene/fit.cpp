@@ -20,7 +20,7 @@ std::string placement_warning(const Box &box, const glm::dvec3 &up) {
     else if (largest > large_mm)
         std::snprintf(text, sizeof text, "is %.3g m large; set its size with 'fit_mm: 100', or its 'unit'",
                       largest / 1000);
-    else if (top <= 0)
+    else if (top < 0)
         std::snprintf(text, sizeof text,
                       "is below the ground: its highest point is at %.3g mm; add 'place: on_ground'", top);
     return text;

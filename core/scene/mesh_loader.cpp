@@ -30,14 +30,14 @@ std::string converter(const std::filesystem::path &file, const std::string &exte
     const auto is_one_of = [&](std::initializer_list<std::string_view> extensions) {
         return std::ranges::find(extensions, extension) != extensions.end();
     };
-    const std::string name = file.filename().string(), result = file.stem().string() + ".glb";
-    const std::string write = "bpy.ops.export_scene.gltf(filepath='" + result + "')\"";
+    const std::string name = "'" + file.filename().string() + "'", result = "'" + file.stem().string() + ".glb'";
+    const std::string write = "bpy.ops.export_scene.gltf(filepath=" + result + ")\"";
     if (extension == ".blend")
         return "blender --background " + name + " --python-expr \"import bpy; " + write;
     if (is_one_of({".usd", ".usda", ".usdc", ".usdz"}))
         return "blender --background --python-expr \"import bpy; bpy.ops.wm.read_factory_settings(use_empty=True); "
-               "bpy.ops.wm.usd_import(filepath='" +
-               name + "'); " + write;
+               "bpy.ops.wm.usd_import(filepath=" +
+               name + "); " + write;
     if (is_one_of({".3mf", ".dae", ".fbx", ".x3d"}))
         return "assimp export " + name + " " + result + " -fglb2";
     return "";

@@ -74,7 +74,7 @@ void set_highlights(const MtlMaterial &mtl, arhost_material &to) {
     to.specular_weight = std::min(2 * std::max({ks.r, ks.g, ks.b}), 1.f); // also at grazing incidence
     constexpr float of_default_index = 0.04f;
     if (to.specular_weight > 0)
-        set(to.specular, ks * ((mirrors ? 1 : 2 * of_default_index) / (of_default_index * to.specular_weight)));
+        set(to.specular, ks / to.specular_weight * (mirrors ? 1 / of_default_index : 2));
 }
 
 // Calls `add`, and names the statement of `texture` in errors.

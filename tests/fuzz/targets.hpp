@@ -52,7 +52,7 @@ inline constexpr Target targets[] = {
     {"pattern", run_pattern, 20000},
     {"scene", run_scene, 8000},
     {"obj", run_obj, 15000},
-    {"mtl", run_mtl, 8000},
+    {"mtl", run_mtl, 2000},
     {"ply", run_ply, 15000},
     {"stl", run_stl, 15000},
     {"gltf", run_gltf, 8000},

@@ -180,8 +180,12 @@ std::uint32_t GltfMaterials::texture_of(const JsonNode &parent, const char *key,
         if (const auto other = transform->find("texCoord"))
             texcoord = other;
     }
-    if (texcoord)
+    if (texcoord) {
+        constexpr int most_sets = 16; // limits the memory of a mesh
+        if (texcoord->index() >= most_sets)
+            texcoord->fail("must be 0 to " + std::to_string(most_sets - 1));
         use.lookup.texcoord_set = static_cast<std::uint32_t>(texcoord->index());
+    }
     if (texture.sampler >= 0) {
         const tinygltf::Sampler &sampler = accessors_.at(content_.model.samplers, texture.sampler, "sampler");
         use.lookup.wrap_u = wrap_of(sampler.wrapS);

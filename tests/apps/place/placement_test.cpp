@@ -75,6 +75,11 @@ TEST_F(APlacement, NamesFilesRelativeToTheOneThatItWrites) {
     EXPECT_THAT(text, HasSubstr("mode: lockstep"));
     EXPECT_THAT(text, HasSubstr("source: {plugin: source_file, path: \"videos/a.mp4\"}"));
     EXPECT_THAT(text, HasSubstr("camera: {file: \"camera.yaml\"}"));
+    placement.width = 640;
+    placement.height = 480;
+    EXPECT_THAT(configuration(placement), HasSubstr("camera: {file: \"camera.yaml\", width: 640, height: 480}"));
+    placement.camera = "/elsewhere/camera.yaml";
+    EXPECT_THAT(configuration(placement), HasSubstr("camera: {file: \"/elsewhere/camera.yaml\""));
     EXPECT_THAT(
         text,
         HasSubstr("tracker: {plugin: tracker_aruco, targets: [{marker: 23, family: \"tag36h11\", side_mm: 80}]}"));

@@ -471,6 +471,8 @@ TEST(Gltf, MalformedMaterialsAreRefusedWithTheirPath) {
                 HasSubstr("materials[0].extensions.KHR_materials_ior.ior: must be 0, or 1 or greater"));
     EXPECT_THAT(error(R"({"normalTexture": {"index": -1}})"),
                 HasSubstr("materials[0].normalTexture.index: must be an index, 0 or greater"));
+    EXPECT_THAT(error(R"({"normalTexture": {"index": 0, "texCoord": 16}})"),
+                HasSubstr("materials[0].normalTexture.texCoord: must be 0 to 15"));
     EXPECT_THAT(error(R"({"doubleSided": 1})"), HasSubstr("materials[0].doubleSided: must be true or false"));
 }
 

@@ -516,18 +516,18 @@ TEST(MeshFile, IsRejectedIfTheFormatIsUnsupported) {
 }
 
 TEST(MeshFile, ErrorsNameTheConverterOfOtherFormats) {
-    const std::string assimp = "convert the file with `assimp export a.";
+    const std::string assimp = "convert the file with `assimp export 'a.";
     for (const std::string extension : {"3mf", "dae", "fbx", "x3d"})
         EXPECT_EQ(error_of("a." + extension, "x"),
                   " the format '." + extension + "' is unsupported; " + assimp + extension +
-                      " a.glb -fglb2`, and name the result with the key 'gltf' instead of 'mesh'");
+                      "' 'a.glb' -fglb2`, and name the result with the key 'gltf' instead of 'mesh'");
     for (const std::string extension : {"usd", "usda", "usdc", "USDZ"})
         EXPECT_THAT(error_of("a." + extension, "x"),
                     HasSubstr("convert the file with `blender --background --python-expr \"import bpy; "
                               "bpy.ops.wm.read_factory_settings(use_empty=True); bpy.ops.wm.usd_import(filepath='a." +
                               extension + "'); bpy.ops.export_scene.gltf(filepath='a.glb')\"`, and"));
     EXPECT_THAT(error_of("a.blend", "x"),
-                HasSubstr("convert the file with `blender --background a.blend --python-expr \"import bpy; "
+                HasSubstr("convert the file with `blender --background 'a.blend' --python-expr \"import bpy; "
                           "bpy.ops.export_scene.gltf(filepath='a.glb')\"`, and"));
 }
 
