@@ -17,11 +17,14 @@ namespace {
 namespace base = arhost::base;
 namespace fs = std::filesystem;
 
-// Refuses to replace a file, which the user may have edited.
-void write_new(const fs::path &file, const std::string &text, bool replaces) {
+// The user may have edited the file.
+void refuse_to_replace(const fs::path &file) {
     std::error_code ignored;
-    if (!replaces && fs::exists(file, ignored))
+    if (fs::exists(file, ignored))
         throw base::InvalidInput(file.string() + ": exists; choose another name with --name, or add --replace");
+}
+
+void write(const fs::path &file, const std::string &text) {
     base::AtomicFile(file).write(text);
     std::fprintf(stderr, "wrote %s\n", file.c_str());
 }
@@ -85,8 +88,11 @@ int main(int argc, char **argv) {
         const fs::path scene = stem + ".scene.yaml", configuration = stem + ".yaml";
         const std::string of_scene = scene_text(placement, scene),
                           of_configuration = configuration_text(placement, scene, configuration);
-        write_new(scene, of_scene, replaces);
-        write_new(configuration, of_configuration, replaces);
+        if (!replaces)
+            for (const fs::path &file : {scene, configuration})
+                refuse_to_replace(file);
+        write(scene, of_scene);
+        write(configuration, of_configuration);
         return only_writes ? int{base::success} : start(configuration);
     });
 }

@@ -45,11 +45,14 @@ std::string extension_of(const fs::path &file) {
     return extension;
 }
 
+// Whether the first MTL file that an OBJ file names exists.
 bool has_material_library(const fs::path &obj) {
     std::ifstream file(obj);
     for (std::string line; std::getline(file, line);)
-        if (line.starts_with("mtllib"))
-            return true;
+        if (line.starts_with("mtllib ")) {
+            const std::size_t end = line.find_last_not_of(" \t\r");
+            return fs::is_regular_file(obj.parent_path() / line.substr(7, end - 6));
+        }
     return false;
 }
 
@@ -106,13 +109,13 @@ std::string scene_text(const Placement &placement, const fs::path &scene) {
     if (!placement.variant.empty())
         model += "    variant: " + quoted(placement.variant) + "\n";
     if (!is_gltf && !(extension == ".obj" && has_material_library(placement.model)))
-        model += "    material: grey\n";
+        model += "    material: plain\n";
     const std::string table = number(20 * std::max(size_mm, placement.side_mm));
     return "# Written by `" + placement.command_line + "`. Format: docs/scenes.md.\n" +
            "version: 2\n"
            "axes: z-up # z: away from the marker\n"
            "materials:\n"
-           "  grey: {model: metallic-roughness, colour: 0.5, metallic: 0, roughness: 0.6}\n"
+           "  plain: {model: metallic-roughness, colour: 0.8, metallic: 0, roughness: 0.6}\n"
            "  table: {model: diffuse, diffuse: 0.5}\n"
            "# Without lamps, the light is a guess that follows the video; docs/light.md tells how to bring that of "
            "your room.\n"

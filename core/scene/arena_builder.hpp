@@ -59,8 +59,6 @@ struct Texture {
     arhost_texel_filter filter = ARHOST_TEXEL_FILTER_LINEAR;
     std::uint32_t texcoord_set = 0;
     glm::mat3x2 image_from_texcoord{1};
-
-    friend bool operator==(const Texture &, const Texture &) = default;
 };
 
 struct Environment {

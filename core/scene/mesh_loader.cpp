@@ -30,7 +30,12 @@ std::string converter(const std::filesystem::path &file, const std::string &exte
     const auto is_one_of = [&](std::initializer_list<std::string_view> extensions) {
         return std::ranges::find(extensions, extension) != extensions.end();
     };
-    const std::string name = "'" + file.filename().string() + "'", result = "'" + file.stem().string() + ".glb'";
+    // Users paste the command into a shell.
+    const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
+    const std::string base = file.filename().string();
+    const bool is_safe = std::ranges::all_of(base, is_plain) && !base.starts_with('-');
+    const std::string name = "'" + (is_safe ? base : "FILE" + extension) + "'",
+                      result = "'" + (is_safe ? file.stem().string() : "FILE") + ".glb'";
     const std::string write = "bpy.ops.export_scene.gltf(filepath=" + result + ")\"";
     if (extension == ".blend")
         return "blender --background " + name + " --python-expr \"import bpy; " + write;

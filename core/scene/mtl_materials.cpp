@@ -117,9 +117,9 @@ bool is_normal_map(const Image &image) {
 TexelImage normals_of_heights(const Image &image, const Reporter &reporter) {
     const std::size_t width = image.width, height = image.height;
     const std::span<const Texel> heights = texels_of(image);
-    TexelImage normals{ARHOST_TEXEL_RGBA32F, image.width, image.height,
-                       Texels::of_size(heights.size() * sizeof(glm::vec4))};
-    auto *to = reinterpret_cast<glm::vec4 *>(normals.texels.bytes.get());
+    TexelImage normals{ARHOST_TEXEL_RGBA8, image.width, image.height,
+                       Texels::of_size(heights.size() * sizeof(Texel))};
+    auto *to = reinterpret_cast<Texel *>(normals.texels.bytes.get());
     const auto at = [&](std::size_t x, std::size_t y) {
         return static_cast<float>(heights[y % height * width + x % width].g) / 255;
     };
@@ -128,7 +128,7 @@ TexelImage normals_of_heights(const Image &image, const Reporter &reporter) {
         for (std::size_t x = 0; x < width; ++x) {
             const float right = (at(x + 1, y) - at(x + width - 1, y)) / 2,
                         down = (at(x, y + 1) - at(x, y + height - 1)) / 2;
-            *to++ = glm::vec4(0.5f + 0.5f * glm::normalize(glm::vec3(-right, down, 1)), 1);
+            *to++ = Texel(glm::round(glm::vec4(127.5f + 127.5f * glm::normalize(glm::vec3(-right, down, 1)), 255)));
         }
     }
     return normals;
@@ -163,8 +163,10 @@ void MtlMaterials::read_library(const std::string &names, const Reporter &report
         }
     }
     for (const std::filesystem::path &path : paths) {
+        if (!read_.insert(path).second)
+            continue;
         MeshFile file = MeshFile::read(path, mtl_size_limit, reporter);
-        for (auto &[name, content] : parse_mtl(file, reporter)) // the first definition applies
+        for (auto &[name, content] : parse_mtl(file, reporter)) // that of the first file applies
             materials_.try_emplace(name, Material{std::move(content), path.parent_path()});
     }
 }
@@ -261,6 +263,10 @@ std::uint32_t MtlMaterials::combined(const Material &material, const std::option
         const auto channels = combine(texels_b);
         const std::uint32_t width = std::max(image_a.width, image_b.width),
                             height = std::max(image_a.height, image_b.height);
+        constexpr std::size_t most_enlargement = 16;
+        if (std::size_t(width) * height > most_enlargement * (texels_a.size() + texels_b.size()))
+            throw ImageError(file_a.string() + " and " + file_b.string() +
+                             ": differ too much in size to be combined; give them the same size");
         TexelImage to{format, width, height, Texels::of_size(std::size_t(width) * height * sizeof(Texel))};
         auto *out = reinterpret_cast<Texel *>(to.texels.bytes.get());
         const auto at = [&](std::span<const Texel> texels, const Image &image, std::size_t x, std::size_t y) {

@@ -9,17 +9,17 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 
 namespace arhost::scene {
 
 // Converts materials to metallic-roughness, glass, or unlit (illum 0):
-// - Roughness: Pr, or from Ns, the exponent of Blinn-Phong: alpha² = 2/(Ns + 2) (Walter et al. 2007, Microfacet
-// Models
-//   for Refraction through Rough Surfaces, 5.2), and roughness² = alpha.
-// - Reflectance at normal incidence: 0.08 Ks, as Blender writes it, so that Ks = 0.5 is a refractive index of 1.5;
-// with
+// - Roughness: Pr, or from Ns, the exponent of Blinn-Phong: alpha² = 2/(Ns + 2) (Walter et al., Microfacet Models
+//   for Refraction, EGSR 2007, section 5.2), and roughness² = alpha.
+// - Reflectance at normal incidence: 0.08 Ks, as Blender writes it, so that Ks = 0.5 is a refractive index of 1.5.
+// With
 //   illum 3, 5 or 8, which reflect the surroundings in proportion to Ks, it is Ks.
 // - Glass: illum 6 and 7; d < 1 with Tf or with illum 4 or 9, if there is no map_d. Maya writes illum 4 and Tf for
 //   opaque materials. Other materials with d < 1 or map_d blend.
@@ -55,6 +55,7 @@ private:
     Textures &textures_;
     std::filesystem::path obj_;
     ReferredFiles files_;
+    std::set<std::filesystem::path> read_; // MTL files
     std::map<std::string, Material> materials_;
 };
 

@@ -804,7 +804,7 @@ private:
     void add_parts(const std::string &name, const Node &path, const MeshWithMaterials &loaded, arhost_role role,
                    const Motion &motion, const LoadCallbacks &callbacks) {
         const MaterialUses &uses = loaded.uses;
-        if (uses.libraries.empty() || uses.runs.empty())
+        if (uses.libraries.empty())
             path.fail("has no materials; add the key 'material' to the object");
         std::vector<std::size_t> parts(loaded.mesh.triangles.size(), uses.names.size());
         for (std::size_t i = 0; i < uses.runs.size(); ++i)

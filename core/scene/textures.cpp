@@ -33,11 +33,12 @@ std::uint32_t Textures::add(const std::string &name, const char *kind, const Tex
         image->second = builder_.add_image(printable(name), make(image_callbacks()));
     Texture texture = lookup;
     texture.image = image->second;
-    for (const auto &[known, index] : textures_)
-        if (known == texture)
-            return index;
-    textures_.emplace_back(texture, builder_.add_texture(texture));
-    return textures_.back().second;
+    static_assert(sizeof texture == 5 * 4 + sizeof texture.image_from_texcoord); // no padding
+    const auto [known, is_new_texture] =
+        textures_.try_emplace(std::string(reinterpret_cast<const char *>(&texture), sizeof texture));
+    if (is_new_texture)
+        known->second = builder_.add_texture(texture);
+    return known->second;
 }
 
 Environment Textures::add_environment(const std::filesystem::path &file) {

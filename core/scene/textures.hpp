@@ -40,8 +40,8 @@ private:
 
     ArenaBuilder &builder_;
     const LoadCallbacks &callbacks_;
-    std::map<std::string, std::uint32_t> images_; // key: name and kind
-    std::vector<std::pair<Texture, std::uint32_t>> textures_;
+    std::map<std::string, std::uint32_t> images_;   // key: name and kind
+    std::map<std::string, std::uint32_t> textures_; // key: the bytes of a Texture
 };
 
 } // namespace arhost::scene

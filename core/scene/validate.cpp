@@ -534,8 +534,7 @@ private:
         const auto morph_normals = view<glm::vec3>(geometry.morph_normals, "the buffer of morph_normals");
         const arhost_object *object = deformers_[i] == ARHOST_NONE ? nullptr : &objects_[deformers_[i]];
         const bool skinned = object && object->skin != ARHOST_NONE;
-        if ((skinned ? joints.empty() || joints.size() % std::max<std::uint64_t>(vertices, 1) != 0
-                     : !joints.empty()) ||
+        if ((skinned ? joints.empty() || vertices == 0 || joints.size() % vertices != 0 : !joints.empty()) ||
             weights.size() != joints.size())
             fail("it has " + std::to_string(joints.size()) + " joints and " + std::to_string(weights.size()) +
                  " weights for " + std::to_string(vertices) + " vertices " + (skinned ? "with" : "without") +

@@ -186,15 +186,15 @@ float *LightSources::add_record(float type) {
     return to;
 }
 
-// Adds the records of an object that emits light. Surfaces with an emission texture or holes, and geometries of
-// several spheres, are not sampled; scattered rays find them.
+// Adds the records of an object that emits light. Surfaces with an emission texture, holes or a clear coat, and
+// geometries of several spheres, are not sampled; scattered rays find them.
 void LightSources::add_emitter(std::uint32_t number, const PlacedObject &placed) {
     const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[number];
     const arhost_material &material = elements<arhost_material>(arena_, arena_.materials)[object.material];
     const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
     if (object.role != ARHOST_ROLE_VIRTUAL || !placed.is_visible || mean_of(material.emission) <= 0 ||
         material.emission_texture != ARHOST_NONE || material.alpha_cutoff > 0 || material.blends != 0 ||
-        material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_GLASS)
+        material.clearcoat > 0 || material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_GLASS)
         return;
     const auto add = [&](SourceType type, Vec3 position, double area) {
         float *to = add_record(static_cast<float>(type));

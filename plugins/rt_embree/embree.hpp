@@ -10,6 +10,7 @@
 #endif
 
 #include <cstddef>
+#include <cstdint>
 #include <type_traits>
 
 // These functions must always be inlined: the kernel is compiled once per instruction set, and the copies must not
@@ -27,6 +28,7 @@ struct Query {
     RTCIntersectContext context;
 #endif
     bool cull_catcher_back_faces;
+    std::uint32_t random_seed; // see random_of() in hit_filter.cpp
 };
 
 // Bits of RTCRay::flags.
@@ -41,6 +43,7 @@ enum class Coherence { coherent, incoherent };
 RT_EMBREE_INLINE Query make_query(Coherence coherence, bool cull_catcher_back_faces = false) {
     Query query;
     query.cull_catcher_back_faces = cull_catcher_back_faces;
+    query.random_seed = 0;
 #if RTC_VERSION_MAJOR >= 4
     rtcInitRayQueryContext(&query.context);
     query.flags = coherence == Coherence::coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;

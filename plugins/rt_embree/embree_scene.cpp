@@ -41,7 +41,8 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
     object.material = &elements<arhost_material>(arena, arena.materials)[from.material];
     object.role = from.role;
     object.has_transform = !is_identity(from.world_from_object);
-    object.blends = object.material->blends != 0 && arena.integrator == ARHOST_INTEGRATOR_PATH;
+    const bool is_path = arena.integrator == ARHOST_INTEGRATOR_PATH;
+    object.has_coat = object.material->clearcoat > 0 && is_path;
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
     if (geometry.type == ARHOST_GEOMETRY_TRIANGLES) {
         const auto floats = [&](const arhost_buffer &buffer) {
@@ -59,6 +60,7 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
             object.colours = reinterpret_cast<const int *>(bytes(arena) + geometry.colours.offset);
         object.colour_stride = geometry.colours.stride;
         object.vertex_count = geometry.positions.count;
+        object.blends = object.material->blends != 0 && is_path;
     }
     return object;
 }

@@ -68,12 +68,13 @@ float opacity_at(const HitFilter &filter, unsigned triangle, float u, float v) {
     return opacity * sampled_alpha(*filter.colour, m[0] * s + m[2] * t + m[4], m[1] * s + m[3] * t + m[5]);
 }
 
-// Returns a number from 0 to 1 that depends on a ray and a triangle only.
+// Returns a number from 0 to 1 that depends on a ray, a triangle and the frame only.
 float random_of(const RTCFilterFunctionNArguments &arguments, unsigned i) {
     const unsigned count = arguments.N;
-    std::uint32_t hash = 0;
+    std::uint32_t hash = query_of(arguments).random_seed;
     for (const std::uint32_t bits : {std::bit_cast<std::uint32_t>(RTCRayN_org_x(arguments.ray, count, i)),
                                      std::bit_cast<std::uint32_t>(RTCRayN_org_y(arguments.ray, count, i)),
+                                     std::bit_cast<std::uint32_t>(RTCRayN_org_z(arguments.ray, count, i)),
                                      std::bit_cast<std::uint32_t>(RTCRayN_dir_x(arguments.ray, count, i)),
                                      std::bit_cast<std::uint32_t>(RTCRayN_dir_y(arguments.ray, count, i)),
                                      std::bit_cast<std::uint32_t>(RTCRayN_dir_z(arguments.ray, count, i)),

@@ -45,7 +45,7 @@ struct Object {
     const float *normals;   // NULL if flat-shaded or a sphere
     const float *texcoords; // NULL if absent; sets follow each other
     const int *colours;     // NULL if absent: two ints per vertex, red and green, blue and opacity, 16 bits each
-    bool blends;            // with the path integrator
+    bool blends, has_coat;  // with the path integrator
     // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on
     // a ball; 0 if the object is not sampled as a light source. Radius of the ball in world space, mm; 0: a mesh.
     float emitter_density, ball_radius;
@@ -108,8 +108,9 @@ struct Scene {
     bool has_gloss;        // whether a catcher may mirror virtual objects
     bool has_several_real; // several catchers or occluders
     bool has_area_lights;
-    bool has_ambient;    // `ambient` is not black
-    bool has_background; // a background that is not black, and no environment
+    std::uint32_t random_seed; // of the frame, for hits of translucent surfaces
+    bool has_ambient;          // `ambient` is not black
+    bool has_background;       // a background that is not black, and no environment
     int sum_row_count() const { return has_gloss ? sum_rows : has_catchers ? hidden_row + 3 : caught_row; }
     const float *linear_of_srgb8; // linear value of each of the 256 sRGB codes
 };

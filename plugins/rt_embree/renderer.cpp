@@ -100,9 +100,9 @@ bool has_specular(const EmbreeScene &scene) {
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     // The first queue holds up to three rays per pixel: one that passes a translucent surface, and two that glass
-    // reflects and refracts or that glossy catchers scatter. All other queues hold fewer than three packets
-    // (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled queues, so each row needs
-    // space for one more packet.
+    // reflects and refracts or that glossy catchers scatter. Other queues get at most three rays for each ray of a
+    // packet, and only while they hold no full packet (trace_queued_rays() in scatter.inl). Whole packets are read
+    // even from partly filled queues.
     constexpr std::int32_t packet = 16, first_capacity = 3 * tile_pixels + packet, capacity = 4 * packet;
     constexpr int pixel_rows = plane_count * 3 + sum_rows + 3 + guide_rows;
     constexpr std::int32_t caught_capacity = tile_pixels / 4 + packet, deferred_capacity = tile_pixels + packet;
@@ -364,6 +364,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 View::picture,
                 [](const void *of) { return static_cast<const Progress *>(of)->goes_on(); },
                 &progress};
+    frame.scene.random_seed = first_random;
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;

@@ -21,6 +21,8 @@
 namespace arhost::scene {
 namespace {
 
+constexpr std::size_t most_instances = 1'000'000; // of all meshes together
+
 double invertible_scale(double scale) { // a scale of 0 hides objects, but has no inverse
     constexpr double least = 1e-6;
     return std::abs(scale) < least ? std::copysign(least, scale) : scale;
@@ -380,11 +382,11 @@ private:
                 channel.period_s = placement_.loops ? duration_s : 0;
                 builder_.add_channel(std::move(channel));
             }
-            if (!(duration_s > 0))
-                throw AnimationError(name_ + ": the animation '" + printable(animation->name) +
-                                     "' has a duration of 0");
             duration_s_ = std::max(duration_s_, duration_s);
         }
+        if (!(duration_s_ > 0))
+            throw AnimationError(name_ + ": the animation '" + printable(animations_.front()->name) +
+                                 "' has a duration of 0");
     }
 
     // Reads skin `index` of the file. The joints of the result are indices in nodes_ plus `first_node`.
@@ -425,14 +427,21 @@ private:
         for (const SceneNode &node : nodes_)
             if (const int mesh = model_.nodes[static_cast<std::size_t>(node.file_node)].mesh;
                 mesh >= 0 && static_cast<std::size_t>(mesh) < mesh_uses_.size())
-                mesh_uses_[static_cast<std::size_t>(mesh)] +=
-                    std::max(instances_of(node.file_node).size(), std::size_t(1));
+                mesh_uses_[static_cast<std::size_t>(mesh)] += instance_count_of(node.file_node);
+    }
+
+    std::size_t instance_count_of(int node) const {
+        const auto extension = json_of("nodes", node).extension("EXT_mesh_gpu_instancing");
+        const auto attributes = extension ? extension->find("attributes") : std::nullopt;
+        for (const char *key : {"TRANSLATION", "ROTATION", "SCALE"})
+            if (const auto accessor = attributes ? attributes->find(key) : std::nullopt)
+                return accessors_.count(accessor->index());
+        return 1;
     }
 
     // EXT_mesh_gpu_instancing. Returns the transforms of the instances of a node's mesh, relative to the node; empty
     // if the node has no such extension.
     std::vector<glm::dmat4> instances_of(int node) const {
-        constexpr std::size_t most = 1'000'000;
         const auto extension = json_of("nodes", node).extension("EXT_mesh_gpu_instancing");
         const auto attributes = extension ? extension->find("attributes") : std::nullopt;
         if (!attributes)
@@ -444,11 +453,11 @@ private:
                 return std::vector<float>();
             std::vector<float> values = accessors_.read<float>(accessor->index(), type, key);
             const std::size_t count = values.size() / width;
-            if (count > most || count == 0 || (!instances.empty() && instances.size() != count))
+            if (count > most_instances || count == 0 || (!instances.empty() && instances.size() != count))
                 accessor->fail("has " + std::to_string(count) +
                                " elements; all attributes of instances must have the "
                                "same number, 1 to " +
-                               std::to_string(most));
+                               std::to_string(most_instances));
             if (!std::ranges::all_of(values, [](float v) { return std::abs(v) <= coordinate_limit_mm; }))
                 accessor->fail("has a value that is NaN or beyond ±1e9");
             instances.resize(count, glm::dmat4(1));
@@ -506,13 +515,27 @@ private:
         return material ? material->index() : -1;
     }
 
+    const GltfMaterials::Material &material_of_primitive(int mesh, std::size_t primitive) {
+        const auto [known, is_new] = primitive_materials_.try_emplace({mesh, primitive});
+        if (is_new) {
+            const JsonNode of_mesh = json_of("meshes", mesh);
+            const std::vector<JsonNode> primitives = of_mesh.find("primitives")->items();
+            if (primitives.size() != model_.meshes[static_cast<std::size_t>(mesh)].primitives.size())
+                of_mesh.fail("has a primitive without attributes");
+            known->second = materials_.at(material_of(primitives[primitive]));
+        }
+        return known->second;
+    }
+
     void add_parts(std::size_t node_index) {
         SceneNode &scene_node = nodes_[node_index];
         const tinygltf::Node &node = model_.nodes[static_cast<std::size_t>(scene_node.file_node)];
         if (node.mesh < 0)
             return;
         const tinygltf::Mesh &mesh = accessors_.at(model_.meshes, node.mesh, "mesh");
-        const std::size_t targets = mesh.primitives.empty() ? 0 : mesh.primitives.front().targets.size();
+        if (mesh.primitives.empty())
+            return;
+        const std::size_t targets = mesh.primitives.front().targets.size();
         const std::vector<double> &weights = node.weights.empty() ? mesh.weights : node.weights;
         scene_node.morph_weights.assign(targets, 0);
         for (std::size_t i = 0; i < std::min(targets, weights.size()); ++i)
@@ -523,8 +546,8 @@ private:
             notice("instances of meshes that deform are ignored");
             instances.clear();
         }
-        const bool is_shared = mesh_uses_[static_cast<std::size_t>(node.mesh)] > 1 && node.skin < 0 && targets == 0;
-        const std::vector<JsonNode> primitives = json_of("meshes", node.mesh).find("primitives")->items();
+        const bool is_shared = (mesh_uses_[static_cast<std::size_t>(node.mesh)] > 1 || !instances.empty()) &&
+                               node.skin < 0 && targets == 0;
         const std::string &own_name = node.name.empty() ? mesh.name : node.name;
         const std::string name =
             placement_.name + "/" +
@@ -538,7 +561,7 @@ private:
             if (placement_.material)
                 material.index = *placement_.material;
             else
-                material = materials_.at(material_of(primitives[i]));
+                material = material_of_primitive(node.mesh, i);
             const auto read_mesh = [&] { return mesh_of(primitive, node.skin >= 0, name, material.index); };
             if (!is_shared) {
                 TriangleMesh own = read_mesh();
@@ -576,6 +599,8 @@ private:
                 parts_.push_back(part);
                 parts_.back().node_from_instance = instance;
             }
+            if (parts_.size() > most_instances)
+                accessors_.fail("has more than " + std::to_string(most_instances) + " instances");
         }
     }
 
@@ -719,6 +744,9 @@ private:
                        none = primitive.attributes.end();
             if (set > 0 && of_joints == none && of_weights == none)
                 break;
+            constexpr int most_sets = 16; // limits the memory of a mesh
+            if (set == most_sets)
+                accessors_.fail("a mesh has more than " + std::to_string(4 * most_sets) + " joints per vertex");
             if (of_joints == none || of_weights == none)
                 accessors_.fail("a mesh has a skin, but not both of the attributes " + joints + " and " + weights);
             const auto indices =
@@ -805,11 +833,14 @@ private:
 
     // Returns the bounding box in the rest pose.
     Box box_at_rest() {
+        std::vector<Part *> deformed;
+        for (Part &part : parts_)
+            if (is_deformed(part))
+                deformed.push_back(&part);
+        const std::vector<TriangleMesh> posed = at_rest(deformed);
+        std::size_t next = 0; // in `posed`
         Box box;
-        for (Part &part : parts_) {
-            const bool deformed = is_deformed(part);
-            Part *const parts[] = {&part};
-            const std::vector<TriangleMesh> posed = deformed ? at_rest(parts) : std::vector<TriangleMesh>();
+        for (const Part &part : parts_) {
             const Transform from_mesh = Transform::of(nodes_[part.node].placement_from_node *
                                                       part.node_from_instance.value_or(glm::dmat4(1)));
             const auto include = [&](const glm::vec3 &p) {
@@ -819,7 +850,7 @@ private:
                 const glm::mat4x3 matrix(from_mesh.matrix());
                 box.include(transformed(glm::value_ptr(matrix), part.shared->box));
             } else {
-                std::ranges::for_each(deformed ? posed.front().positions : part.mesh.positions, include);
+                std::ranges::for_each(is_deformed(part) ? posed[next++].positions : part.mesh.positions, include);
             }
         }
         return box;
@@ -945,7 +976,9 @@ private:
     GltfMaterials materials_;
     std::optional<std::size_t> variant_; // index in KHR_materials_variants
     std::vector<std::size_t> mesh_uses_; // for each mesh of the file: number of instances in the scene
-    std::map<std::pair<int, std::size_t>, SharedMesh> shared_; // key: mesh and primitive of the file
+    // Keys: mesh and primitive of the file.
+    std::map<std::pair<int, std::size_t>, SharedMesh> shared_;
+    std::map<std::pair<int, std::size_t>, GltfMaterials::Material> primitive_materials_;
     std::set<std::string> notices_;
     std::vector<SceneNode> nodes_;
     std::vector<std::uint32_t> scene_index_;              // file node → index in nodes_ or ARHOST_NONE

@@ -32,15 +32,6 @@ std::vector<JsonNode> JsonNode::items() const {
     return items;
 }
 
-std::vector<std::pair<std::string, JsonNode>> JsonNode::entries() const {
-    if (!value_->is_object())
-        fail("must be an object");
-    std::vector<std::pair<std::string, JsonNode>> entries;
-    for (const auto &[key, value] : value_->items())
-        entries.emplace_back(key, JsonNode(value, path_.empty() ? key : path_ + "." + key, file_));
-    return entries;
-}
-
 std::optional<JsonNode> JsonNode::extension(const char *name) const {
     const auto extensions = find("extensions");
     return extensions ? extensions->find(name) : std::nullopt;

@@ -22,9 +22,8 @@ public:
 
     [[noreturn]] void fail(const std::string &message) const;
 
-    std::optional<JsonNode> find(const char *key) const;           // std::nullopt if this object has no such property
-    std::vector<JsonNode> items() const;                           // of an array
-    std::vector<std::pair<std::string, JsonNode>> entries() const; // of an object
+    std::optional<JsonNode> find(const char *key) const; // std::nullopt if this object has no such property
+    std::vector<JsonNode> items() const;                 // of an array
     std::optional<JsonNode> extension(const char *name) const;
 
     // Values beyond the range by at most 1e-3, such as 1.0000001, become its nearest end.

@@ -75,7 +75,8 @@ GltfMaterials::Material GltfMaterials::read(const JsonNode &node) {
     read_specular(node, material);
     read_transmission(node, material);
     read_clearcoat(node, material);
-    return {builder_.add_material(material), node.boolean_or("doubleSided", false)};
+    const bool is_volume = material.transmission > 0 && material.thin_walled == 0; // its back faces end it
+    return {builder_.add_material(material), node.boolean_or("doubleSided", false) || is_volume};
 }
 
 void GltfMaterials::read_opacity(const JsonNode &node, float factor, arhost_material &material) const {

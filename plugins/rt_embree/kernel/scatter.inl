@@ -281,7 +281,7 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
 }
 
 // Traces packets until all queues are empty. Picks the deepest queue that holds a full packet. This keeps every queue
-// except the first below three packets. If no queue holds a full packet, picks the shallowest non-empty queue,
+// except the first below four packets. If no queue holds a full packet, picks the shallowest non-empty queue,
 // because its secondary rays may fill the deeper queues.
 template <class TracePacket> ARHOST_INLINE void trace_queued_rays(Work &work, TracePacket trace_packet) {
     RayQueue *queues = work.scratch.queues;

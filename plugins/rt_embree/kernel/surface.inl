@@ -232,7 +232,8 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             s.emission = select(here, diffuse, s.emission);
             return;
         }
-        if (material.occlusion_texture != ARHOST_NONE && scene.has_ambient) {
+        if (material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS && material.occlusion_texture != ARHOST_NONE &&
+            scene.has_ambient) {
             const Float occlusion =
                 sample_object_texture(scene, object, material.occlusion_texture, hit, here).colour.x;
             ambient = ambient * (Float(1.0f) + (occlusion - Float(1.0f)) * Float(material.occlusion_strength));
@@ -275,7 +276,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
                     s.transmitted);
                 s.any_transmission = true;
             }
-            if (material.clearcoat > 0) {
+            if (object.has_coat) {
                 Float coat = material.clearcoat, coat_roughness = material.clearcoat_roughness;
                 if (material.clearcoat_texture != ARHOST_NONE)
                     coat =

@@ -42,6 +42,7 @@ ARHOST_INLINE Bool trace(const Scene &scene, RTCScene bvh, Query query, RTCRayHi
     alignas(64) int valid[lanes];
     active = active & is_valid_ray(origin_of(rays.ray), direction_of(rays.ray));
     store(valid, active);
+    query.random_seed = scene.random_seed;
     store(rays.hit.geomID, Int(no_hit));
     store(rays.hit.instID[0], Int(no_hit));
     intersect16(valid, bvh, scene.packet_width, query, rays);
@@ -56,6 +57,7 @@ ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
     // The rays of a packet aim at different points of the lights. Besides, Embree 3.13.5 hangs in coherent occlusion
     // queries through instances with AVX-512.
     Query query = make_query(Coherence::incoherent);
+    query.random_seed = scene.random_seed;
     occluded16(valid, scene.root, scene.packet_width, query, rays);
     return active & (load(rays.tfar) < Float(0.0f)); // Embree sets −∞ on a hit
 }

@@ -106,12 +106,12 @@ float opacity_at(uint object, uint triangle, vec2 uv) {
 
 const float LEAST_OPACITY = 1.0 / 512.0; // the eye does not see points of a lower opacity
 
-// Returns a number from 0 to 1 that depends on a ray and a triangle only.
+// Returns a number from 0 to 1 that depends on a ray, a triangle and the frame only.
 float random_of_hit(vec3 origin, vec3 direction, uint triangle) {
     uint bits[7] = uint[](floatBitsToUint(origin.x), floatBitsToUint(origin.y), floatBitsToUint(origin.z),
                           floatBitsToUint(direction.x), floatBitsToUint(direction.y), floatBitsToUint(direction.z),
                           triangle);
-    uint hash = 0u;
+    uint hash = frame.first_random;
     for (int i = 0; i < 7; ++i) { // MurmurHash3's finalizer
         hash = (hash ^ bits[i]) * 0x85ebca6bu;
         hash = (hash ^ (hash >> 13)) * 0xc2b2ae35u;

@@ -57,13 +57,16 @@ TEST_F(APlacement, StandsOnItsMarkerInTheSizeOfIt) {
 }
 
 TEST_F(APlacement, UsesTheMaterialsOfTheFile) {
-    write("a.obj", "mtllib a.mtl\nusemtl red\n" + tetrahedron);
+    write("a.obj", "mtllib a b.mtl \nusemtl red\n" + tetrahedron);
+    write("a b.mtl", "");
+    write("d.obj", "mtllib missing.mtl\n" + tetrahedron);
     write("b.obj", tetrahedron);
     write("c.GLB", "");
     const auto text = [&](const char *file) { return scene_text(of(file), folder_.path() / "a.scene.yaml"); };
-    EXPECT_THAT(text("a.obj"), Not(HasSubstr("material: grey")));
-    EXPECT_THAT(text("b.obj"), HasSubstr("material: grey"));
-    EXPECT_THAT(text("c.GLB"), testing::AllOf(HasSubstr("gltf: \"c.GLB\""), Not(HasSubstr("material: grey"))));
+    EXPECT_THAT(text("a.obj"), Not(HasSubstr("material: plain")));
+    EXPECT_THAT(text("b.obj"), HasSubstr("material: plain"));
+    EXPECT_THAT(text("d.obj"), HasSubstr("material: plain"));
+    EXPECT_THAT(text("c.GLB"), testing::AllOf(HasSubstr("gltf: \"c.GLB\""), Not(HasSubstr("material: plain"))));
 }
 
 TEST_F(APlacement, NamesFilesRelativeToTheOneThatItWrites) {

@@ -434,6 +434,8 @@ const Corruption faults_of_motion[] = {
      "has 4 joints and 0 weights for 4 vertices without a skin"},
     {"JointCount", [](Parts a) { a.geometries[2].joints.count = 3; }, "3 joints and 4 weights"},
     {"WeightCount", [](Parts a) { a.geometries[2].weights.count = 3; }, "4 joints and 3 weights"},
+    {"SkinWithoutVertices", [](Parts a) { a.geometries[2].positions = {}; },
+     "4 joints and 4 weights for 0 vertices with a skin"},
     {"JointIndex", [](Parts a) { a.all<std::uint16_t>(a.geometries[2].joints)[15] = 2; },
      "vertex 3 refers to joint 2, but the skin has only 2 joints"},
     {"WeightSum", [](Parts a) { a.floats(a.geometries[2].weights)[4] = 0.9f; },

@@ -485,6 +485,10 @@ TEST(Gltf, HidesBackFacesOfOpenMeshesOnly) {
         gltf.more = R"(, "materials": [)" + material + "]";
         return arhost::scene::test::object(load(gltf.text(), object).arena).hides_back_faces != 0;
     };
+    EXPECT_FALSE(hides(R"({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_volume": {"thicknessFactor": 1}}})",
+                       std::string("\0\1\2", 3)))
+        << "the back faces of a volume end it";
     const std::string open("\0\1\2", 3), closed("\0\2\1\0\1\3\0\3\2\1\2\3", 12),
         inside_out("\0\1\2\0\3\1\0\2\3\1\3\2", 12);
     EXPECT_TRUE(hides("{}", open));
@@ -492,6 +496,27 @@ TEST(Gltf, HidesBackFacesOfOpenMeshesOnly) {
     EXPECT_FALSE(hides("{}", closed));
     EXPECT_TRUE(hides("{}", inside_out));
     EXPECT_FALSE(hides("{}", open, ", material: grey")) << "materials of the scene are double-sided";
+}
+
+TEST(Gltf, SkipsMeshesWithoutPrimitivesAndRefusesPrimitivesWithoutAttributes) {
+    Gltf gltf = triangle();
+    gltf.meshes += ", {}";
+    gltf.nodes += R"(, {"mesh": 1})";
+    gltf.scene_nodes = "0, 1";
+    EXPECT_EQ(load(gltf.text()).arena.scene().objects.count, 1u);
+    gltf.meshes = R"({"primitives": [{"material": 0}, {"attributes": {"POSITION": 0}}]})";
+    gltf.nodes = R"({"mesh": 0})";
+    gltf.scene_nodes = "0";
+    EXPECT_THAT(error_of(gltf.text()), HasSubstr("meshes[0]: has a primitive without attributes"));
+}
+
+TEST(Gltf, PlacesASingleInstance) {
+    Gltf gltf = triangle();
+    gltf.floats({100, 50, 0}, "VEC3", 3); // accessor 2
+    gltf.nodes = R"({"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2}}}})";
+    const Arena arena = load(gltf.text()).arena;
+    EXPECT_EQ(object(arena).world_from_object[9], 100);
+    EXPECT_EQ(object(arena).world_from_object[10], 50);
 }
 
 TEST(Gltf, ChoosesAVariant) {

@@ -106,7 +106,7 @@ enum {
                                      F0 = `reflectivity` */
     ARHOST_MATERIAL_GLASS = 5,    /* refraction and reflection weighted by a Fresnel term, absorption inside */
     ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6, /* as in glTF 2.0: GGX specular over Lambert diffuse */
-    ARHOST_MATERIAL_UNLIT = 7 /* has the radiance `diffuse` in each direction, under any light; is no light source */
+    ARHOST_MATERIAL_UNLIT = 7               /* has the radiance `diffuse` in each direction, under any light */
 };
 
 /* Colours are linear light, 0 to 1, Rec. 709 primaries. A texture field is an index or ARHOST_NONE. The value of the
@@ -144,8 +144,8 @@ typedef struct arhost_material {
     /* Metallic-roughness with ARHOST_INTEGRATOR_PATH: the share `transmission` · R of transmission_texture · (1 −
      * metallic) of the diffuse light is refracted instead, by microfacets of the same roughness, and tinted by the
      * diffuse colour: by its square root at each surface of a solid, by itself at a thin wall. A solid refracts by
-     * `index` and absorbs by `extinction`. A thin wall does neither (KHR_materials_transmission,
-     * KHR_materials_volume). */
+     * `index` and absorbs by `extinction`. A thin wall does neither. Its reflection follows from `index` alone,
+     * without the fields of specular light and the clear coat (KHR_materials_transmission, KHR_materials_volume). */
     float transmission; /* 0 to 1 */
     uint32_t transmission_texture;
     uint32_t thin_walled;
