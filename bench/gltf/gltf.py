@@ -37,7 +37,7 @@ DIRECTIONS = {name: FRONT for name in (
     "MeshPrimitiveModes", "MetalRoughSpheresNoTextures", "MultiUVTest", "NormalTangentTest", "TextureTransformTest",
     "TransmissionTest")}
 # Cycles does not show these as glTF defines them.
-NOT_CARRIED = {}
+NOT_CARRIED = {"TransmissionTest": "thin walls, which Blender refracts as solid glass"}
 CELL, LABEL, LARGEST_SHEET = (192, 144), 14, 400_000  # px, px, bytes
 
 
@@ -135,7 +135,7 @@ class Comparison:
     def row(self):
         if self.rejected:
             return f"{self.name:28} rejected: {self.rejected}"
-        return f"{self.name:28} {self.silhouette:12.3f} {self.flip:8.3f} {self.codes:8.2f}   {self.reason}"
+        return f"{self.name:28} {self.silhouette:13.3f} {self.flip:8.3f} {self.codes:8.2f}   {self.reason}"
 
     def strip(self):
         """Its row of the sheet: the viewer's screenshot, Cycles, arhost, difference."""
@@ -177,7 +177,7 @@ def main():
         raise SystemExit(f"gltf: ../shared/data/gltf has no model {', '.join(unknown)}")
     os.makedirs(FOLDER, exist_ok=True)
     render_cycles(names)
-    print(f"{'model':28} {'silhouette, %':>12} {'FLIP':>7} {'codes':>8}   not comparable", flush=True)
+    print(f"{'model':28} {'silhouette, %':>13} {'FLIP':>8} {'codes':>8}   not comparable", flush=True)
     compared = []
     for name in names:
         compared.append(Comparison(name))
@@ -189,7 +189,7 @@ def main():
     carried = [each for each in compared if not each.rejected and not each.reason]
     missed += [f"{each.name}: silhouette {each.silhouette:.3f} %, target {LARGEST_SILHOUETTE}" for each in carried
                if each.silhouette > LARGEST_SILHOUETTE]
-    mean = np.mean([each.flip for each in carried])
+    mean = sum(each.flip for each in carried) / max(1, len(carried))
     print(f"mean FLIP of {len(carried)} models: {mean:.3f}")
     if mean > LARGEST_FLIP:
         missed.append(f"mean FLIP {mean:.3f}, target {LARGEST_FLIP}")

@@ -61,11 +61,11 @@ def complete(material):
 
 
 def vertices():
-    """Of all meshes in the world, in the axes of glTF."""
+    """Of all meshes with faces in the world, in the axes of glTF."""
     graph = bpy.context.evaluated_depsgraph_get()
     found = []
     for thing in bpy.context.scene.objects:
-        if thing.type == "MESH":
+        if thing.type == "MESH" and thing.data.polygons:
             data = thing.evaluated_get(graph).data
             points = np.empty(3 * len(data.vertices), np.float32)
             data.vertices.foreach_get("co", points)
