@@ -340,7 +340,9 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
         if (s.any_rough) {
             const Vec3 half_vector = normalize(sample.direction + to_eye);
             const Vec3 fresnel = fresnel_of(s, dot(to_eye, half_vector));
-            const Vec3 diffuse = sample.is_background ? black() : s.diffuse * (white() - fresnel) * sample.cosine;
+            const Vec3 diffuse = sample.is_background
+                                     ? black()
+                                     : s.diffuse * passing_fresnel(s, dot(to_eye, half_vector)) * sample.cosine;
             const Float lobe = rough_lobe(s, to_eye, half_vector, sample, visibility, rays_follow);
             reflected = select(s.is_rough, diffuse + fresnel * lobe, reflected);
         }

@@ -300,7 +300,7 @@ ARHOST_FUNCTION void change_catcher(Work &work, const Paths &paths, const RTCRay
     if (any_glossy) {
         add_radiance(work, of_gloss, mirrored + by_photons.mirrored, glossy);
         add_radiance(work, in_plane(paths, covered_plane), covered, glossy);
-        const Vec3 matt = s.diffuse * (white() - fresnel_of(s, dot(s.normal, to_eye))) * before;
+        const Vec3 matt = s.diffuse * passing_fresnel(s, dot(s.normal, to_eye)) * before;
         const int first = paths.first_pixel & (tile_pixels - 1);
         add_to_sum(work.scratch, matt_row, first, select(glossy, matt.x, Float(0.0f)));
         add_to_sum(work.scratch, matt_row + 1, first, select(glossy, matt.y, Float(0.0f)));

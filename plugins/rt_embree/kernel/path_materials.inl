@@ -46,7 +46,9 @@ ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light) {
         const Vec3 half_vector = normalize(to_light + to_eye);
         const Vec3 fresnel = fresnel_of(s, dot(to_eye, half_vector));
         const Float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-        scattered = select(s.is_rough, s.diffuse * (white() - fresnel) * cosine + fresnel * lobe, scattered);
+        scattered =
+            select(s.is_rough, s.diffuse * passing_fresnel(s, dot(to_eye, half_vector)) * cosine + fresnel * lobe,
+                   scattered);
         if (s.any_coat) {
             const Float coat = s.coat * coat_reflectance(dot(to_eye, half_vector)) *
                                ggx_lobe(lambert(s.coat_normal, to_light), dot(s.coat_normal, to_eye),

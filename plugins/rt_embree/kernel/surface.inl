@@ -30,7 +30,16 @@ struct Surface {
     Bool is_real;  // a catcher or occluder
     // Whether any lane has the property. A surface with any_scattering spawns secondary rays.
     bool any_specular, any_rough, any_scattering, any_translucent, any_transmission, any_coat;
+    // The reflectance of the non-metallic part of a rough surface, at normal and at grazing incidence. The light that
+    // it does not reflect reaches the diffuse layer.
+    Vec3 dielectric;
+    Float dielectric_edge;
 };
+
+// Returns the share of the light that passes to the diffuse layer of a rough surface.
+ARHOST_INLINE Vec3 passing_fresnel(const Surface &s, Float cosine) {
+    return white() - schlick_between(s.dielectric, s.dielectric_edge, cosine);
+}
 
 // Fresnel's reflectance of a rough surface.
 ARHOST_INLINE Vec3 fresnel_of(const Surface &s, Float cosine) {
@@ -161,7 +170,8 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     Surface s; // without `= {}`, which GCC compiles to a slow string instruction
     s.ambient = s.diffuse = s.specular = s.emission = s.lift = black();
     s.exponent = s.alpha = Float(0.0f);
-    s.edge_reflectance = s.opacity = Float(1.0f);
+    s.edge_reflectance = s.opacity = s.dielectric_edge = Float(1.0f);
+    s.dielectric = black();
     s.is_lit = s.is_unlit = s.is_rough = s.is_real = bool_of(false);
     s.any_specular = s.any_rough = s.any_scattering = s.any_translucent = s.any_transmission = s.any_coat = false;
     s.transmission = s.coat = Float(0.0f);
@@ -261,6 +271,8 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             dielectric =
                 Vec3{min(dielectric.x, Float(1.0f)), min(dielectric.y, Float(1.0f)), min(dielectric.z, Float(1.0f))} *
                 weight;
+            s.dielectric = select(here, dielectric, s.dielectric);
+            s.dielectric_edge = select(here, weight, s.dielectric_edge);
             s.specular = select(here, metallic_reflectance(dielectric, diffuse, metallic), s.specular);
             s.edge_reflectance = select(here, weight + (Float(1.0f) - weight) * metallic, s.edge_reflectance);
             s.alpha = select(here, ggx_alpha(roughness), s.alpha);

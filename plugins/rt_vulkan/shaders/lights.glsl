@@ -265,7 +265,7 @@ void add_reflected(inout DirectLight sum, Surface s, vec3 to_eye, LightSample ar
     if (s.is_rough) {
         vec3 half_vector = normalize(arriving.direction + to_eye);
         vec3 fresnel = fresnel_of(s, dot(to_eye, half_vector));
-        vec3 diffuse = arriving.is_background ? vec3(0.0) : reflected * (vec3(1.0) - fresnel);
+        vec3 diffuse = arriving.is_background ? vec3(0.0) : reflected * passing_fresnel(s, dot(to_eye, half_vector));
         reflected = diffuse + fresnel * rough_lobe(s, to_eye, half_vector, arriving, visible, rays_follow);
     } else if (s.exponent > 0.0) {
         reflected += s.specular * phong(s.normal, arriving.direction, to_eye, s.exponent);

@@ -282,7 +282,7 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     if (receiver != LIT_SURFACE && s.is_rough)
         relative *= shadowed_share(s);
     if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
-        matt = s.diffuse * (vec3(1.0) - fresnel_of(s, dot(s.normal, -direction))) * before;
+        matt = s.diffuse * passing_fresnel(s, dot(s.normal, -direction)) * before;
         mirrors = scatters && mirrors_virtual(s, -direction);
     }
     float form_factors = receiver == LIT_SURFACE ? 0.0 : form_factors_of(s);

@@ -30,7 +30,7 @@ vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
     if (s.is_rough) {
         vec3 half_vector = normalize(to_light + to_eye), fresnel = fresnel_of(s, dot(to_eye, half_vector));
         float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-        vec3 scattered = s.diffuse * (vec3(1.0) - fresnel) * cosine + fresnel * lobe;
+        vec3 scattered = s.diffuse * passing_fresnel(s, dot(to_eye, half_vector)) * cosine + fresnel * lobe;
         if (has_coat && s.coat > 0.0)
             scattered = scattered * below_coat(s, to_eye) +
                         vec3(s.coat * coat_reflectance(dot(to_eye, half_vector)) *

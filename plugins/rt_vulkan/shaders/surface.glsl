@@ -23,7 +23,16 @@ struct Surface {
     vec3 transmitted;
     float coat, coat_alpha; // share of a clear coat, and its GGX roughness parameter
     vec3 coat_normal;
+    // The reflectance of the non-metallic part of a rough surface, at normal and at grazing incidence. The light that it
+    // does not reflect reaches the diffuse layer.
+    vec3 dielectric;
+    float dielectric_edge;
 };
+
+// Returns the share of the light that passes to the diffuse layer of a rough surface.
+vec3 passing_fresnel(Surface s, float cosine) {
+    return vec3(1.0) - schlick_between(s.dielectric, s.dielectric_edge, cosine);
+}
 
 // Fresnel's reflectance of a rough surface.
 vec3 fresnel_of(Surface s, float cosine) {
@@ -132,7 +141,8 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
     }
     s.ambient = s.diffuse = s.specular = s.emission = vec3(0.0);
     s.exponent = s.alpha = s.transmission = s.coat = 0.0;
-    s.edge_reflectance = s.opacity = s.coat_alpha = 1.0;
+    s.edge_reflectance = s.opacity = s.coat_alpha = s.dielectric_edge = 1.0;
+    s.dielectric = vec3(0.0);
     s.transmitted = vec3(0.0);
     s.is_rough = false;
     return s;
@@ -204,6 +214,8 @@ void add_material(inout Surface s, Hit hit, vec3 to_eye) {
     }
     if (is_rough) {
         dielectric = min(dielectric, 1.0) * specular_weight;
+        s.dielectric = dielectric;
+        s.dielectric_edge = specular_weight;
         s.specular = metallic_reflectance(dielectric, s.diffuse, metallic);
         s.edge_reflectance = specular_weight + (1.0 - specular_weight) * metallic;
         s.alpha = ggx_alpha(roughness);

@@ -224,6 +224,16 @@ TEST(PathMaterials, CoatOfABlackSurfaceReflectsFourPercent) {
     EXPECT_NEAR(mean_at(rendered(std::move(scene), from_above(), {{"samples", "256"}}), 100, 75), 0.02, 0.002);
 }
 
+// glTF 2.0, appendix B.2: the mean of a dielectric and a metal, weighted by `metallic`.
+TEST(PathMaterials, PartlyMetallicSurfacesMixBothModels) {
+    const auto reflected = [](float metallic) {
+        SceneBuilder scene = in_a_furnace(1);
+        scene.add_mesh("white", square(60), metallic_roughness({1, 1, 1}, metallic, 0.4f));
+        return mean_at(rendered(std::move(scene), from_above(), {{"samples", "256"}}), 100, 75);
+    };
+    EXPECT_NEAR(reflected(0.5f), (reflected(0) + reflected(1)) / 2, 0.01);
+}
+
 TEST(PathMaterials, IndexAndSpecularWeightSetTheReflectanceOfNonMetals) {
     const auto reflected = [](float index, float weight, float red) {
         SceneBuilder scene = in_a_furnace(1);
