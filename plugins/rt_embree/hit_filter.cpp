@@ -52,8 +52,10 @@ float opacity_at(const HitFilter &filter, unsigned triangle, float u, float v) {
     float opacity = filter.opacity;
     if (filter.colours) {
         float mean = 0;
-        for (int i = 0; i < 3; ++i)
-            mean += weight[i] * filter.colours[std::size_t(corners[i]) * (filter.colour_stride / 2) + 3];
+        for (int i = 0; i < 3; ++i) {
+            const std::size_t at = std::size_t(corners[i]) * (filter.colour_stride / 2) + 3;
+            mean += weight[i] * static_cast<float>(filter.colours[at]);
+        }
         opacity *= mean * (1.0f / 65535);
     }
     if (!filter.colour)
