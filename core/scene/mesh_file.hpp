@@ -5,6 +5,7 @@
 
 #include "scene/callbacks.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -71,6 +72,15 @@ inline void skip_blanks(const char *&p, const char *end) {
 inline void skip_line(const char *&p, const char *end) {
     const void *newline = p < end ? std::char_traits<char>::find(p, end - p, '\n') : nullptr;
     p = newline ? static_cast<const char *>(newline) + 1 : end;
+}
+
+// Returns the text from p to the end of the line, without blanks around it.
+inline std::string_view rest_of_line(const char *p, const char *end) {
+    skip_blanks(p, end);
+    const char *stop = std::find(p, end, '\n');
+    while (stop > p && is_blank(stop[-1]))
+        --stop;
+    return {p, static_cast<std::size_t>(stop - p)};
 }
 
 // Returns the token at p for error messages: shortened, and with '?' for each character that is not printable ASCII.

@@ -92,7 +92,7 @@ private:
         if (name.empty() || name[0] == '#' || name == "ka" || name == "map_ka")
             return;
         if (name == "newmtl") {
-            material_ = &(materials_[std::string(rest_of_line())] = {});
+            material_ = &(materials_[std::string(rest_of_line(p_, end_))] = {});
             return;
         }
         const auto *colour = find(colour_keys, name);
@@ -166,7 +166,7 @@ private:
                 break;
             }
         }
-        texture.file = rest_of_line();
+        texture.file = rest_of_line(p_, end_);
         std::ranges::replace(texture.file, '\\', '/');
         if (texture.file.empty())
             fail("the name of an image is missing");
@@ -221,13 +221,6 @@ private:
     bool next_word() {
         word();
         return !word_.empty();
-    }
-    std::string_view rest_of_line() {
-        skip_blanks(p_, end_);
-        const char *stop = std::find(p_, end_, '\n');
-        while (stop > p_ && is_blank(stop[-1]))
-            --stop;
-        return {p_, static_cast<std::size_t>(stop - p_)};
     }
     static std::string lower(std::string_view text) {
         std::string result(text);

@@ -57,7 +57,7 @@ private:
         else if (word("usemtl"))
             use_material(line);
         else if (word("mtllib"))
-            uses_.libraries.emplace_back(rest_of_line());
+            uses_.libraries.emplace_back(rest_of_line(p_, end_));
         else if (word("l") || word("p") || word("curv") || word("surf"))
             other_shapes_ = true;
     }
@@ -122,17 +122,9 @@ private:
         colours_.emplace_back(linear(0), linear(1), linear(2), colour_channel(static_cast<double>(colour[3])));
     }
 
-    // Names may contain blanks.
-    std::string_view rest_of_line() {
-        skip_blanks(p_, end_);
-        const char *stop = std::find(p_, end_, '\n');
-        while (stop > p_ && is_blank(stop[-1]))
-            --stop;
-        return {p_, static_cast<std::size_t>(stop - p_)};
-    }
-
     void use_material(const char *line) {
-        const auto [name, is_new] = names_.try_emplace(std::string(rest_of_line()), uses_.names.size());
+        // Names may contain blanks.
+        const auto [name, is_new] = names_.try_emplace(std::string(rest_of_line(p_, end_)), uses_.names.size());
         if (is_new) {
             line_number_ += static_cast<std::size_t>(std::count(counted_, line, '\n'));
             counted_ = line;

@@ -549,8 +549,7 @@ template <class Points> void check_extent(const Node &shape, const Points &point
                 shape.fail("extends beyond 1e9 mm after its transform");
 }
 
-std::string extent_of(const TriangleMesh &mesh) {
-    const Box box = box_of(std::span<const glm::vec3>(mesh.positions));
+std::string extent_of(const Box &box) {
     const glm::vec3 size = box.max - box.min;
     char text[96];
     std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm", size.x, size.y, size.z);
@@ -606,19 +605,20 @@ MeshWithMaterials mesh_of(const Node &object, const Node &path, const glm::dvec3
         else
             loaded = load_mesh_with_materials(path.input_path(), options, callbacks);
         TriangleMesh &mesh = loaded.mesh;
-        const Box box = box_of(std::span<const glm::vec3>(mesh.positions));
-        (world_from_object * fit_of(object).transform(box, up)).apply(mesh);
+        const auto box = [&] { return box_of(std::span<const glm::vec3>(mesh.positions)); };
+        const Fit fit = fit_of(object);
+        (world_from_object * fit.transform(fit.needs_box() ? box() : Box(), up)).apply(mesh);
         check_extent(path, mesh.positions);
         if (std::ranges::any_of(mesh.texcoords, [](const glm::vec2 &t) {
                 return std::abs(t.x) > coordinate_limit_mm || std::abs(t.y) > coordinate_limit_mm;
             }))
             path.fail("has texture coordinates beyond 1e9");
+        const Box placed = box();
         if (callbacks.info)
             callbacks.info(path.input_path().string() + (missing ? " (stand-in): " : ": ") +
                            std::to_string(mesh.triangles.size()) + " triangles, " +
-                           std::to_string(mesh.positions.size()) + " vertices, " + extent_of(mesh));
+                           std::to_string(mesh.positions.size()) + " vertices, " + extent_of(placed));
         const auto role = object.find("role");
-        const Box placed = box_of(std::span<const glm::vec3>(mesh.positions));
         if (!role && !object.find("on") && !object.find("motion") && callbacks.warning)
             if (const std::string warning = placement_warning(placed, up); !warning.empty())
                 callbacks.warning(path.input_path().string() + ": " + warning);

@@ -76,8 +76,8 @@ private:
     struct SceneNode {
         int file_node;                      // index of the node in the file
         std::uint32_t parent = ARHOST_NONE; // index in nodes_
-        glm::dmat4 placement_from_node{
-            1};                   // in the rest pose, relative to placement_.node; before place(), to the axes
+        // In the rest pose; to the axes of the scene until place(), then to the coordinates of placement_.node.
+        glm::dmat4 placement_from_node{1};
         bool has_channel = false; // the animation changes its translation, rotation or scale
         bool moves = false;       // the animation moves this node or an ancestor
         bool has_weights_channel = false;
