@@ -4,6 +4,7 @@
 #include "scene/box.hpp"
 #include "scene/motion.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <new>
 #include <stdexcept>
@@ -50,6 +51,7 @@ arhost_geometry put_geometry(Writer &writer, const TriangleMesh &mesh) {
     geometry.positions = writer.put(mesh.positions);
     geometry.normals = writer.put(mesh.normals);
     geometry.texcoords = writer.put(mesh.texcoords);
+    geometry.tangents = writer.put(mesh.tangents);
     geometry.colours = writer.put(mesh.colours);
     geometry.indices = writer.put(mesh.triangles);
     geometry.joints = writer.put(mesh.joints);
@@ -81,7 +83,12 @@ arhost_texel_image put_image(Writer &writer, const TexelImage &image, std::uint3
         return std::span(reinterpret_cast<const Texel *>(image.texels.bytes.get()),
                          image.texels.size / sizeof(Texel));
     };
-    return {image.format, image.width, image.height, name,
+    return {image.format,
+            image.width,
+            image.height,
+            name,
+            image.level_count,
+            0,
             image.format == ARHOST_TEXEL_RGBA32F ? writer.put(texels(glm::vec4()))
                                                  : writer.put(texels(glm::u8vec4()))};
 }
@@ -137,9 +144,13 @@ arhost_material make_material(arhost_material_model model) {
     material.colour_texture = material.metallic_roughness_texture = material.normal_texture =
         material.emission_texture = material.occlusion_texture = material.specular_texture =
             material.specular_colour_texture = material.transmission_texture = material.clearcoat_texture =
-                material.clearcoat_roughness_texture = material.clearcoat_normal_texture = ARHOST_NONE;
+                material.clearcoat_roughness_texture = material.clearcoat_normal_texture = material.sheen_texture =
+                    material.sheen_roughness_texture = material.anisotropy_texture = material.iridescence_texture =
+                        material.iridescence_thickness_texture = ARHOST_NONE;
     material.opacity = material.normal_scale = material.occlusion_strength = material.specular_weight =
         material.clearcoat_normal_scale = 1;
+    material.anisotropy_direction[0] = 1;
+    material.iridescence_index = 1.3f;
     if (model == ARHOST_MATERIAL_METALLIC_ROUGHNESS)
         copy(glm::vec3(1), material.specular);
     material.exponent = 1;
@@ -155,6 +166,13 @@ arhost_material make_material(arhost_material_model model) {
     material.importance_cutoff = 0.01f;
     material.reflection_depth = material.refraction_depth = max_depth_limit;
     return material;
+}
+
+std::uint64_t texel_count(std::uint32_t width, std::uint32_t height, std::uint32_t level_count) {
+    std::uint64_t count = 0;
+    for (std::uint32_t level = 0; level < level_count; ++level)
+        count += std::uint64_t(std::max(width >> level, 1u)) * std::max(height >> level, 1u);
+    return count;
 }
 
 arhost_light make_light(arhost_light_type type) {

@@ -51,7 +51,11 @@ struct TexelImage {
     arhost_texel_format format = ARHOST_TEXEL_SRGB8;
     std::uint32_t width = 0, height = 0;
     Texels texels;
+    std::uint32_t level_count = 1;
 };
+
+// Returns the number of texels in the first `level_count` levels of an image (arhost_texel_image).
+std::uint64_t texel_count(std::uint32_t width, std::uint32_t height, std::uint32_t level_count);
 
 struct Texture {
     std::uint32_t image = 0;

@@ -25,6 +25,7 @@ struct TriangleMesh {
     std::vector<glm::vec2> texcoords; // of set 0, one per vertex; then of set 1, …; or empty
     std::vector<glm::uvec3> triangles;
     std::vector<glm::u16vec4> colours{}; // linear RGB and opacity, one per vertex, or empty
+    std::vector<glm::vec4> tangents{};   // one per vertex, as in arhost_geometry, or empty
     // Empty unless the mesh deforms. The layout is that of arhost_geometry.
     std::vector<glm::u16vec4> joints{};
     std::vector<glm::vec4> weights{};

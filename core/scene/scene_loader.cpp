@@ -674,9 +674,9 @@ private:
     void set_origin(const Node &node) { builder_.set_origin(node.where() + ": " + node.path()); }
 
     void add_object(const Node &node, std::size_t index, std::size_t count) {
-        node.allow_keys({"name",   "mesh",      "gltf",   "animation", "loop",  "speed", "variant",
-                         "smooth", "stand_in",  "sphere", "cuboid",    "plane", "unit",  "fit_mm",
-                         "place",  "transform", "motion", "material",  "role",  "on"});
+        node.allow_keys({"name",   "mesh",   "gltf",      "animation", "loop",     "speed", "variant",
+                         "lights", "smooth", "stand_in",  "sphere",    "cuboid",   "plane", "unit",
+                         "fit_mm", "place",  "transform", "motion",    "material", "role",  "on"});
         const std::string shape_key = shape_key_of(node);
         const Node shape = node.require(shape_key);
         for (const char *key : {"smooth", "stand_in"})
@@ -685,7 +685,7 @@ private:
         for (const char *key : {"unit", "fit_mm", "place"})
             if (const auto of_model = node.find(key); of_model && shape_key != "gltf" && shape_key != "mesh")
                 of_model->fail("is only allowed with 'gltf' and 'mesh'");
-        for (const char *key : {"variant", "loop", "speed"})
+        for (const char *key : {"variant", "loop", "speed", "lights"})
             if (const auto of_gltf = node.find(key); of_gltf && shape_key != "gltf")
                 of_gltf->fail("is only allowed with 'gltf'");
         if (const auto animation = node.find("animation"); animation && shape_key != "gltf")
@@ -783,6 +783,8 @@ private:
         if (const auto loop = object.find("loop"))
             placement.loops = loop->boolean();
         placement.speed = real_or(object, "speed", 0.001, 1000, 1);
+        if (const auto lights = object.find("lights"))
+            placement.has_lights = lights->boolean();
         const auto variant = object.find("variant");
         if (variant)
             placement.variant = variant->text();

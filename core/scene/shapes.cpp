@@ -51,9 +51,15 @@ void Transform::apply(TriangleMesh &mesh) const {
     const glm::dmat3 normal_matrix = glm::transpose(glm::inverse(linear_));
     for (glm::vec3 &normal : mesh.normals)
         normal = glm::normalize(normal_matrix * glm::dvec3(normal));
-    if (glm::determinant(linear_) < 0)
+    for (glm::vec4 &tangent : mesh.tangents)
+        if (const glm::dvec3 along = linear_ * glm::dvec3(tangent); glm::length(along) > 0)
+            tangent = glm::vec4(glm::normalize(along), tangent.w);
+    if (glm::determinant(linear_) < 0) {
         for (glm::uvec3 &triangle : mesh.triangles)
             std::swap(triangle.y, triangle.z);
+        for (glm::vec4 &tangent : mesh.tangents)
+            tangent.w = -tangent.w;
+    }
 }
 
 TriangleMesh rectangle(const glm::dvec3 &centre, const glm::dvec3 &normal, const glm::dvec3 &up,

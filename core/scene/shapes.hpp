@@ -32,8 +32,8 @@ public:
     // Returns the scale factor, or std::nullopt if it depends on the direction.
     std::optional<double> uniform_scale() const;
 
-    // Transforms positions, and normals by the inverse transpose. If the transform mirrors, flips the winding, so
-    // front faces remain front faces.
+    // Transforms positions and tangents, and normals by the inverse transpose. If the transform mirrors, flips the
+    // winding, so front faces remain front faces.
     void apply(TriangleMesh &mesh) const;
 
 private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/textures.hpp"
 
+#include "scene/image_levels.hpp"
 #include "scene/mesh_file.hpp"
 
 namespace arhost::scene {
@@ -29,8 +30,11 @@ std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse 
 std::uint32_t Textures::add(const std::string &name, const char *kind, const Texture &lookup,
                             const std::function<TexelImage(const LoadCallbacks &)> &make) {
     const auto [image, is_new] = images_.try_emplace(name + "\n" + kind);
-    if (is_new)
-        image->second = builder_.add_image(printable(name), make(image_callbacks()));
+    if (is_new) {
+        TexelImage made = make(image_callbacks());
+        add_levels(made);
+        image->second = builder_.add_image(printable(name), std::move(made));
+    }
     Texture texture = lookup;
     texture.image = image->second;
     static_assert(sizeof texture == 5 * 4 + sizeof texture.image_from_texcoord); // no padding

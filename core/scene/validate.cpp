@@ -296,9 +296,16 @@ private:
         if (image.width - 1 >= texture_side_limit || image.height - 1 >= texture_side_limit)
             fail(what + "it has " + std::to_string(image.width) + " x " + std::to_string(image.height) +
                  " texels; each side must have 1 to " + std::to_string(texture_side_limit));
-        if (image.texels.count != std::uint64_t(image.width) * image.height)
+        if (image.reserved != 0)
+            fail(what + "a reserved field is not 0");
+        if (const auto most = static_cast<std::uint32_t>(std::bit_width(std::max(image.width, image.height)));
+            image.level_count - 1 >= most)
+            fail(what + "it has " + std::to_string(image.level_count) + " levels; it must have 1 to " +
+                 std::to_string(most));
+        if (image.texels.count != texel_count(image.width, image.height, image.level_count))
             fail(what + "it has " + std::to_string(image.texels.count) + " texels for " +
-                 std::to_string(image.width) + " x " + std::to_string(image.height));
+                 std::to_string(image.width) + " x " + std::to_string(image.height) + " in " +
+                 std::to_string(image.level_count) + " levels");
         if (image.format != ARHOST_TEXEL_RGBA32F) {
             view<std::uint32_t>(image.texels, what + "the buffer of texels");
         } else if (const auto texels = floats_of(view<glm::vec4>(image.texels, what + "the buffer of texels"));
@@ -461,6 +468,14 @@ private:
         check_floats({&material.clearcoat_roughness, 1}, 0, 1, what + "clearcoat_roughness");
         check_floats({&material.clearcoat_normal_scale, 1}, -coordinate_limit_mm, coordinate_limit_mm,
                      what + "clearcoat_normal_scale");
+        check_floats(material.sheen, 0, 1, what + "sheen");
+        check_floats({&material.sheen_roughness, 1}, 0, 1, what + "sheen_roughness");
+        check_floats({&material.anisotropy, 1}, 0, 1, what + "anisotropy");
+        if (!is_unit(material.anisotropy_direction))
+            fail(what + "its anisotropy_direction is not of length 1");
+        check_floats({&material.iridescence, 1}, 0, 1, what + "iridescence");
+        check_floats({&material.iridescence_index, 1}, 1, 4, what + "iridescence_index");
+        check_floats(material.iridescence_thickness_nm, 0, film_thickness_limit_nm, what + "iridescence_thickness");
         check_floats({&material.metallic, 1}, 0, 1, what + "metallic");
         check_floats({&material.roughness, 1}, 0, 1, what + "roughness");
         check_floats({&material.index, 1}, 1, 4, what + "index");
@@ -550,6 +565,8 @@ private:
             fail("it has " + std::to_string(morph_normals.size()) + " morph_normals for " +
                  std::to_string(morph_positions.size()) + " morph_positions and " +
                  std::to_string(geometry.normals.count) + " normals; morph_normals need normals");
+        if (object && geometry.tangents.count > 0)
+            fail("it deforms, but has tangents");
         check_coordinates(floats_of(morph_positions), 3, "morph position");
         check_coordinates(floats_of(morph_normals), 3, "morph normal");
         if (!skinned)
@@ -603,6 +620,13 @@ private:
                  " vertices");
         check_coordinates(floats_of(positions), 3, "vertex");
         check_coordinates(floats_of(texcoords), 2, "texcoord");
+        const auto tangents = view<glm::vec4>(geometry.tangents, "the buffer of tangents");
+        if (!tangents.empty() && (tangents.size() != positions.size() || normals.empty()))
+            fail("it has " + std::to_string(tangents.size()) + " tangents for " + std::to_string(positions.size()) +
+                 " vertices and " + std::to_string(normals.size()) + " normals; tangents need normals");
+        for (const glm::vec4 &t : tangents)
+            if (t != glm::vec4(0) && (!is_unit({&t.x, 3}) || std::abs(t.w) != 1))
+                fail("tangent " + std::to_string(&t - tangents.data()) + " is neither 0 nor a unit vector and ±1");
         check_normals(normals);
         check_indices(triangles, positions.size());
         return box_of(positions);
@@ -637,10 +661,10 @@ private:
     Box check_spheres(const arhost_geometry &geometry) {
         const auto spheres = view<glm::vec4>(geometry.positions, "the buffer of spheres");
         for (const arhost_buffer &other :
-             {geometry.normals, geometry.texcoords, geometry.colours, geometry.indices, geometry.joints,
-              geometry.weights, geometry.morph_positions, geometry.morph_normals})
+             {geometry.normals, geometry.texcoords, geometry.tangents, geometry.colours, geometry.indices,
+              geometry.joints, geometry.weights, geometry.morph_positions, geometry.morph_normals})
             if (other.count != 0 || other.offset != 0 || other.stride != 0)
-                fail("spheres cannot have normals, texcoords, colours, indices or deformation");
+                fail("spheres cannot have normals, texcoords, tangents, colours, indices or deformation");
         if (spheres.empty())
             fail("it has no spheres");
         check_coordinates(floats_of(spheres), 4, "sphere");

@@ -212,7 +212,7 @@ EXPECTED_MARKER = _struct(80,
 
 # arhost/scene.h
 SCENE_MAGIC = 0x435354534f485241
-SCENE_VERSION = 5
+SCENE_VERSION = 6
 NONE = 0xffffffff
 BUFFER = _struct(16,
     ("offset", "u8", 0),
@@ -222,27 +222,30 @@ AXES_Z_UP = 1
 AXES_Y_UP = 2
 GEOMETRY_TRIANGLES = 1
 GEOMETRY_SPHERES = 2
-GEOMETRY = _struct(152,
+GEOMETRY = _struct(168,
     ("type", "i4", 0),
     ("reserved", "u4", 4),
     ("positions", BUFFER, 8),
     ("normals", BUFFER, 24),
     ("texcoords", BUFFER, 40),
-    ("colours", BUFFER, 56),
-    ("indices", BUFFER, 72),
-    ("joints", BUFFER, 88),
-    ("weights", BUFFER, 104),
-    ("morph_positions", BUFFER, 120),
-    ("morph_normals", BUFFER, 136))
+    ("tangents", BUFFER, 56),
+    ("colours", BUFFER, 72),
+    ("indices", BUFFER, 88),
+    ("joints", BUFFER, 104),
+    ("weights", BUFFER, 120),
+    ("morph_positions", BUFFER, 136),
+    ("morph_normals", BUFFER, 152))
 TEXEL_SRGB8 = 1
 TEXEL_RGBA8 = 2
 TEXEL_RGBA32F = 3
-TEXEL_IMAGE = _struct(32,
+TEXEL_IMAGE = _struct(40,
     ("format", "i4", 0),
     ("width", "u4", 4),
     ("height", "u4", 8),
     ("name", "u4", 12),
-    ("texels", BUFFER, 16))
+    ("level_count", "u4", 16),
+    ("reserved", "u4", 20),
+    ("texels", BUFFER, 24))
 WRAP_REPEAT = 1
 WRAP_CLAMP = 2
 WRAP_MIRROR = 3
@@ -262,7 +265,7 @@ MATERIAL_METAL = 4
 MATERIAL_GLASS = 5
 MATERIAL_METALLIC_ROUGHNESS = 6
 MATERIAL_UNLIT = 7
-MATERIAL = _struct(240,
+MATERIAL = _struct(304,
     ("model", "i4", 0),
     ("colour_texture", "u4", 4),
     ("ambient", ("f4", (3,)), 8),
@@ -294,17 +297,29 @@ MATERIAL = _struct(240,
     ("clearcoat_roughness_texture", "u4", 152),
     ("clearcoat_normal_texture", "u4", 156),
     ("clearcoat_normal_scale", "f4", 160),
-    ("index", "f4", 164),
-    ("fresnel_exponent", "f4", 168),
-    ("fresnel_minimum", "f4", 172),
-    ("fresnel_maximum", "f4", 176),
-    ("refraction", ("f4", (3,)), 180),
-    ("extinction", ("f4", (3,)), 192),
-    ("shadow_attenuation", ("f4", (3,)), 204),
-    ("cutoff_colour", ("f4", (3,)), 216),
-    ("importance_cutoff", "f4", 228),
-    ("reflection_depth", "u4", 232),
-    ("refraction_depth", "u4", 236))
+    ("sheen", ("f4", (3,)), 164),
+    ("sheen_roughness", "f4", 176),
+    ("sheen_texture", "u4", 180),
+    ("sheen_roughness_texture", "u4", 184),
+    ("anisotropy", "f4", 188),
+    ("anisotropy_direction", ("f4", (2,)), 192),
+    ("anisotropy_texture", "u4", 200),
+    ("iridescence", "f4", 204),
+    ("iridescence_index", "f4", 208),
+    ("iridescence_thickness_nm", ("f4", (2,)), 212),
+    ("iridescence_texture", "u4", 220),
+    ("iridescence_thickness_texture", "u4", 224),
+    ("index", "f4", 228),
+    ("fresnel_exponent", "f4", 232),
+    ("fresnel_minimum", "f4", 236),
+    ("fresnel_maximum", "f4", 240),
+    ("refraction", ("f4", (3,)), 244),
+    ("extinction", ("f4", (3,)), 256),
+    ("shadow_attenuation", ("f4", (3,)), 268),
+    ("cutoff_colour", ("f4", (3,)), 280),
+    ("importance_cutoff", "f4", 292),
+    ("reflection_depth", "u4", 296),
+    ("refraction_depth", "u4", 300))
 ROLE_VIRTUAL = 1
 ROLE_CATCHER = 2
 ROLE_OCCLUDER = 3

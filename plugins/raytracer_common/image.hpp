@@ -30,6 +30,8 @@ struct Texture {
     // Set of texture coordinates, and (u, v) from them (arhost_texture).
     std::uint32_t texcoord_set = 0;
     float image_from_texcoord[6] = {1, 0, 0, 1, 0, 0};
+    // Smaller versions of the image, for surfaces that are far away (arhost_texel_image).
+    std::int32_t level_count = 1, first_of_level[15] = {}; // index of the first texel of each level
 };
 
 // The video under the overlay, undistorted coordinates to pixels as in arhost/camera.h.

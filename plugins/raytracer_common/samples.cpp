@@ -43,4 +43,9 @@ std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count) {
     return samples;
 }
 
+float ray_angle(const arhost_intrinsics &intrinsics, std::size_t samples_per_pixel) {
+    return static_cast<float>(1 / std::sqrt(intrinsics.fx * intrinsics.fy *
+                                            static_cast<double>(std::max<std::size_t>(samples_per_pixel, 1))));
+}
+
 } // namespace arhost::raytracer_common

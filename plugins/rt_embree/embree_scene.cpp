@@ -42,7 +42,12 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
     object.role = from.role;
     object.has_transform = !is_identity(from.world_from_object);
     const bool is_path = arena.integrator == ARHOST_INTEGRATOR_PATH;
-    object.has_coat = object.material->clearcoat > 0 && is_path;
+    const auto has = [&](float strength) { return strength > 0 && is_path; };
+    const arhost_material &material = *object.material;
+    object.has_coat = has(material.clearcoat);
+    object.has_sheen = has(std::max({material.sheen[0], material.sheen[1], material.sheen[2]}));
+    object.is_anisotropic = has(material.anisotropy);
+    object.has_film = has(material.iridescence);
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[from.geometry];
     if (geometry.type == ARHOST_GEOMETRY_TRIANGLES) {
         const auto floats = [&](const arhost_buffer &buffer) {
@@ -56,6 +61,8 @@ Object make_object(const arhost_scene &arena, const arhost_object &from) {
         object.texcoord_stride = geometry.texcoords.stride;
         object.indices = reinterpret_cast<const int *>(bytes(arena) + geometry.indices.offset);
         object.index_stride = geometry.indices.stride;
+        object.tangents = floats(geometry.tangents);
+        object.tangent_stride = geometry.tangents.stride;
         if (geometry.colours.count)
             object.colours = reinterpret_cast<const int *>(bytes(arena) + geometry.colours.offset);
         object.colour_stride = geometry.colours.stride;
@@ -173,6 +180,10 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
                     static_cast<std::int32_t>(image.height), image.format, texture.wrap_u, texture.wrap_v,
                     texture.filter == ARHOST_TEXEL_FILTER_NEAREST, texture.texcoord_set});
         std::ranges::copy(texture.image_from_texcoord, to.image_from_texcoord);
+        to.level_count = static_cast<std::int32_t>(image.level_count);
+        for (std::int32_t level = 1; level < to.level_count; ++level)
+            to.first_of_level[level] = to.first_of_level[level - 1] +
+                                       std::max(to.width >> (level - 1), 1) * std::max(to.height >> (level - 1), 1);
     }
     view_.textures = textures_.data();
     for (std::uint32_t number = 0; number < from.size(); ++number) {

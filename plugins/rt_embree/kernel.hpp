@@ -44,12 +44,13 @@ struct Object {
     const float *positions; // vertex positions
     const float *normals;   // NULL if flat-shaded or a sphere
     const float *texcoords; // NULL if absent; sets follow each other
+    const float *tangents;  // NULL if absent: four floats per vertex
     const int *colours;     // NULL if absent: two ints per vertex, red and green, blue and opacity, 16 bits each
-    bool blends, has_coat;  // with the path integrator
+    bool blends, has_coat, has_sheen, is_anisotropic, has_film; // with the path integrator
     // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on
     // a ball; 0 if the object is not sampled as a light source. Radius of the ball in world space, mm; 0: a mesh.
     float emitter_density, ball_radius;
-    std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride, colour_stride;
+    std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride, tangent_stride, colour_stride;
     std::uint32_t vertex_count;
 };
 
@@ -108,6 +109,7 @@ struct Scene {
     bool has_gloss;        // whether a catcher may mirror virtual objects
     bool has_several_real; // several catchers or occluders
     bool has_area_lights;
+    float ray_angle; // width of a sample from the eye, in units of its distance; 0: textures are not filtered
     std::uint32_t random_seed; // of the frame, for hits of translucent surfaces
     bool has_ambient;          // `ambient` is not black
     bool has_background;       // a background that is not black, and no environment

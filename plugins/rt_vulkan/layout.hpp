@@ -31,7 +31,7 @@ struct Object {
     std::uint32_t root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
     std::uint32_t first_index, first_normal, first_texcoord;
     float extent[3], emitter_density;
-    std::uint32_t first_colour, vertex_count, unused[2]; // first_colour: in the buffer of indices
+    std::uint32_t first_colour, vertex_count, first_tangent, unused; // first_colour: in the buffer of indices
 };
 
 struct Material {
@@ -60,6 +60,11 @@ struct Material {
     std::uint32_t specular_texture, specular_colour_texture, transmission_texture, thin_walled;
     float transmission, clearcoat, clearcoat_roughness, clearcoat_normal_scale;
     std::uint32_t clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture, unused;
+    float sheen[3], sheen_roughness;
+    std::uint32_t sheen_texture, sheen_roughness_texture, anisotropy_texture, iridescence_texture;
+    float anisotropy_direction[2], anisotropy, iridescence;
+    float iridescence_thickness_nm[2], iridescence_index;
+    std::uint32_t iridescence_thickness_texture;
 };
 
 struct Light {
@@ -79,7 +84,8 @@ struct Texture {
     std::uint32_t format, first_texel, wrap_u, wrap_v; // first_texel: in 32-bit words
     std::int32_t width, height;
     std::uint32_t is_nearest, texcoord_set;
-    float image_from_texcoord[6], unused[2];
+    float image_from_texcoord[6];
+    std::uint32_t level_count, unused;
 };
 
 struct Node {
@@ -148,10 +154,11 @@ struct Frame {
     float targets[arhost::raytracer_common::LightSources::max_spheres][4];
     std::uint32_t target_count, first_target, first_target_chance;
     float scene_extent;
-    std::uint32_t photon_count, first_photon, shown_parts, unused;
+    std::uint32_t photon_count, first_photon, shown_parts;
+    float ray_angle;
 };
 
-static_assert(sizeof(Object) == 224 && sizeof(Material) == 240 && sizeof(Light) == 80 && sizeof(Texture) == 64 &&
+static_assert(sizeof(Object) == 224 && sizeof(Material) == 304 && sizeof(Light) == 80 && sizeof(Texture) == 64 &&
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 64 &&
               sizeof(Frame) == 1008 + 16 * max_samples);
 
@@ -182,7 +189,7 @@ struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
     std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss, has_photons, may_denoise,
-        has_coat;
+        has_coat, has_sheen, is_anisotropic, has_film;
 };
 
 } // namespace rt_vulkan

@@ -428,7 +428,10 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    mirrors,
                                    settings_.photons > 0,
                                    denoiser_.has_value(),
-                                   scene_.has_coat()};
+                                   scene_.has_coat(),
+                                   scene_.has_sheen(),
+                                   scene_.is_anisotropic(),
+                                   scene_.has_film()};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
     if (settings_.photons > 0)
@@ -667,6 +670,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         samples_ = arhost::raytracer_common::sample_positions(frame_.first_random % (1u << 16), settings_.samples);
     }
     frame_.sample_count = static_cast<std::uint32_t>(samples_.size());
+    frame_.ray_angle = is_path_ ? arhost::raytracer_common::ray_angle(intrinsics_, samples_.size()) : 0;
     for (std::size_t i = 0; i < samples_.size(); ++i) {
         frame_.samples[i][0] = samples_[i].x;
         frame_.samples[i][1] = samples_[i].y;

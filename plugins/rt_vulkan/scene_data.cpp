@@ -81,6 +81,18 @@ Material material_of(const arhost_material &from, bool is_path) {
     to.clearcoat_texture = from.clearcoat_texture;
     to.clearcoat_roughness_texture = from.clearcoat_roughness_texture;
     to.clearcoat_normal_texture = from.clearcoat_normal_texture;
+    copy(from.sheen, to.sheen);
+    to.sheen_roughness = from.sheen_roughness;
+    to.sheen_texture = from.sheen_texture;
+    to.sheen_roughness_texture = from.sheen_roughness_texture;
+    to.anisotropy = from.anisotropy;
+    copy(from.anisotropy_direction, to.anisotropy_direction);
+    to.anisotropy_texture = from.anisotropy_texture;
+    to.iridescence = from.iridescence;
+    to.iridescence_index = from.iridescence_index;
+    copy(from.iridescence_thickness_nm, to.iridescence_thickness_nm);
+    to.iridescence_texture = from.iridescence_texture;
+    to.iridescence_thickness_texture = from.iridescence_thickness_texture;
     if (from.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS) // the reflectance of non-metals at normal incidence
         for (float &channel : to.specular)
             channel *= arhost::shading::normal_reflectance(from.index);
@@ -162,6 +174,7 @@ SceneData::SceneData(const arhost_raytracer_setup &setup, bool has_bvhs, const a
     moving_attributes_ = attributes_.size();
     for (auto &[geometry, mesh] : meshes_) {
         add_texcoords(mesh, geometries[geometry]);
+        add_tangents(mesh, geometries[geometry]);
         add_colours(mesh, geometries[geometry]);
     }
     for (const arhost_object &object : objects) {
@@ -170,6 +183,7 @@ SceneData::SceneData(const arhost_raytracer_setup &setup, bool has_bvhs, const a
             Mesh &mesh = mesh_of(object.geometry, false);
             add_normals(mesh, geometries[object.geometry]);
             add_texcoords(mesh, geometries[object.geometry]);
+            add_tangents(mesh, geometries[object.geometry]);
             add_colours(mesh, geometries[object.geometry]);
         }
         add_object(object, meshes_.at(object.geometry));
@@ -226,7 +240,7 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     mesh.first_primitive = static_cast<std::uint32_t>(primitives_.size());
     mesh.root = has_bvhs_ ? static_cast<std::uint32_t>(nodes_.size()) : mesh.first_primitive;
     mesh.first_index = static_cast<std::uint32_t>(indices_.size());
-    mesh.first_normal = mesh.first_texcoord = mesh.first_colour = ARHOST_NONE;
+    mesh.first_normal = mesh.first_texcoord = mesh.first_tangent = mesh.first_colour = ARHOST_NONE;
     mesh.local = empty_box();
     mesh.is_empty = boxes.empty();
     if (boxes.empty())
@@ -253,28 +267,30 @@ SceneData::Mesh &SceneData::mesh_of(std::uint32_t number, bool deforms) {
     return mesh;
 }
 
-void SceneData::add_normals(Mesh &mesh, const arhost_geometry &geometry) {
-    if (geometry.normals.count == 0)
-        return;
-    mesh.first_normal = static_cast<std::uint32_t>(attributes_.size());
-    for (std::uint32_t i = 0; i < geometry.normals.count; ++i) {
-        float normal[3];
-        std::memcpy(normal, bytes(arena_) + geometry.normals.offset + std::size_t{geometry.normals.stride} * i,
-                    sizeof normal);
-        attributes_.insert(attributes_.end(), normal, normal + 3);
+// Appends a buffer of elements of `size` floats to the attributes. Returns the index of the first float, or
+// ARHOST_NONE if the buffer is absent.
+template <std::size_t size> std::uint32_t SceneData::add_attribute(const arhost_buffer &buffer) {
+    if (buffer.count == 0)
+        return ARHOST_NONE;
+    const auto first = static_cast<std::uint32_t>(attributes_.size());
+    for (std::uint32_t i = 0; i < buffer.count; ++i) {
+        float element[size];
+        std::memcpy(element, bytes(arena_) + buffer.offset + std::size_t{buffer.stride} * i, sizeof element);
+        attributes_.insert(attributes_.end(), element, element + size);
     }
+    return first;
+}
+
+void SceneData::add_normals(Mesh &mesh, const arhost_geometry &geometry) {
+    mesh.first_normal = add_attribute<3>(geometry.normals);
 }
 
 void SceneData::add_texcoords(Mesh &mesh, const arhost_geometry &geometry) {
-    if (geometry.texcoords.count == 0)
-        return;
-    mesh.first_texcoord = static_cast<std::uint32_t>(attributes_.size());
-    for (std::uint32_t i = 0; i < geometry.texcoords.count; ++i) {
-        float texcoord[2];
-        std::memcpy(texcoord, bytes(arena_) + geometry.texcoords.offset + std::size_t{geometry.texcoords.stride} * i,
-                    sizeof texcoord);
-        attributes_.insert(attributes_.end(), texcoord, texcoord + 2);
-    }
+    mesh.first_texcoord = add_attribute<2>(geometry.texcoords);
+}
+
+void SceneData::add_tangents(Mesh &mesh, const arhost_geometry &geometry) {
+    mesh.first_tangent = add_attribute<4>(geometry.tangents);
 }
 
 void SceneData::add_colours(Mesh &mesh, const arhost_geometry &geometry) {
@@ -349,6 +365,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     object.first_index = mesh.first_index;
     object.first_normal = mesh.first_normal;
     object.first_texcoord = mesh.first_texcoord;
+    object.first_tangent = mesh.first_tangent;
     object.first_colour = mesh.first_colour;
     object.vertex_count = geometry.positions.count;
     if (geometry.type == ARHOST_GEOMETRY_SPHERES)
@@ -368,6 +385,9 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     set_transform(object, mesh, from.world_from_object);
     has_glass_ |= is_glass || (is_path && material.transmission > 0);
     has_coat_ |= is_path && material.clearcoat > 0;
+    has_sheen_ |= is_path && std::max({material.sheen[0], material.sheen[1], material.sheen[2]}) > 0;
+    is_anisotropic_ |= is_path && material.anisotropy > 0;
+    has_film_ |= is_path && material.iridescence > 0;
     blends_ |= (object.flags & rt_vulkan::blends) != 0;
     has_specular_ |= from.role == ARHOST_ROLE_VIRTUAL && (is_specular(material) || material.blends);
     has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
@@ -500,6 +520,7 @@ void SceneData::add_textures() {
         to.height = static_cast<std::int32_t>(image.height);
         to.is_nearest = from.filter == ARHOST_TEXEL_FILTER_NEAREST;
         to.texcoord_set = from.texcoord_set;
+        to.level_count = image.level_count;
         copy(from.image_from_texcoord, to.image_from_texcoord);
         textures_.push_back(to);
     }
@@ -518,6 +539,7 @@ void SceneData::add_path_textures(const arhost_raytracer_setup &setup) {
         to.wrap_v = ARHOST_WRAP_CLAMP;
         to.width = static_cast<std::int32_t>(width);
         to.height = static_cast<std::int32_t>(height);
+        to.level_count = 1;
         textures_.push_back(to);
         return static_cast<std::uint32_t>(textures_.size() - 1);
     };

@@ -66,6 +66,9 @@ public:
     bool has_catchers() const { return has_catchers_; }
     bool has_holes() const { return has_holes_; } // whether any object rejects hits (ObjectFlag)
     bool has_coat() const { return has_coat_; }
+    bool has_sheen() const { return has_sheen_; }
+    bool is_anisotropic() const { return is_anisotropic_; }
+    bool has_film() const { return has_film_; }
     bool blends() const { return blends_; }       // whether any object is translucent
     bool has_gloss() const { return has_gloss_; } // whether a catcher may mirror
     bool has_area_lights() const { return has_area_lights_; }
@@ -77,7 +80,7 @@ public:
 private:
     // The offsets of a geometry's data in the arrays below.
     struct Mesh {
-        std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord, first_colour;
+        std::uint32_t root, first_primitive, first_index, first_normal, first_texcoord, first_tangent, first_colour;
         Box local;
         bool is_empty;
         // The following members are set for deforming meshes only.
@@ -87,6 +90,8 @@ private:
 
     Mesh &mesh_of(std::uint32_t geometry, bool deforms);
     void add_normals(Mesh &mesh, const arhost_geometry &geometry);
+    template <std::size_t size> std::uint32_t add_attribute(const arhost_buffer &buffer);
+    void add_tangents(Mesh &mesh, const arhost_geometry &geometry);
     void add_texcoords(Mesh &mesh, const arhost_geometry &geometry);
     void add_colours(Mesh &mesh, const arhost_geometry &geometry);
     void write_bvh(const Mesh &mesh, const arhost_geometry &geometry, Points points);
@@ -134,7 +139,7 @@ private:
     std::uint32_t solid_objects_ = 0, environment_rows_ = 0, environment_columns_ = 0;
     bool anything_moves_ = false, has_glass_ = false, has_catchers_ = false, has_holes_ = false, has_gloss_ = false,
          has_area_lights_ = false, has_real_ = false, has_several_real_ = false, has_specular_ = false,
-         has_coat_ = false, blends_ = false;
+         has_coat_ = false, has_sheen_ = false, is_anisotropic_ = false, has_film_ = false, blends_ = false;
     std::uint64_t rebuilds_ = 0;
 };
 

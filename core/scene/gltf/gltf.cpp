@@ -3,9 +3,11 @@
 
 #include "scene/box.hpp"
 #include "scene/gltf/accessors.hpp"
+#include "scene/gltf/lights.hpp"
 #include "scene/gltf/materials.hpp"
 #include "scene/material_textures.hpp"
 #include "scene/motion.hpp"
+#include "scene/tangents.hpp"
 
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -30,10 +32,21 @@ double invertible_scale(double scale) { // a scale of 0 hides objects, but has n
 
 // docs/scenes.md lists them.
 constexpr std::string_view supported_extensions[] = {
-    "EXT_mesh_gpu_instancing", "KHR_materials_clearcoat", "KHR_materials_emissive_strength",
-    "KHR_materials_ior",       "KHR_materials_specular",  "KHR_materials_transmission",
-    "KHR_materials_unlit",     "KHR_materials_variants",  "KHR_materials_volume",
-    "KHR_mesh_quantization",   "KHR_texture_transform",
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
 };
 
 bool is_supported(const std::string &extension) {
@@ -64,6 +77,8 @@ public:
         find_deforming_parts();
         place();
         bake_static_deformations();
+        if (placement_.has_lights)
+            add_lights();
         if (!animations_.empty())
             add_motion();
         for (Part &part : parts_)
@@ -580,6 +595,7 @@ private:
                 shared.box = box_of(std::span<const glm::vec3>(read.positions));
                 if (shared.triangles > 0) {
                     shared.is_closed = is_closed(read);
+                    complete_tangents(read, material.index);
                     shared.geometry = builder_.add_triangles(std::move(read));
                 }
             }
@@ -642,6 +658,11 @@ private:
             mesh.normals = vec3s(normal, "NORMAL");
             check_count(mesh.normals.size(), "NORMAL");
         }
+        if (const int tangent = attribute(primitive.attributes, "TANGENT");
+            tangent >= 0 && !mesh.normals.empty() && normal_texcoord_set_of(material)) {
+            mesh.tangents = tangents_of(tangent);
+            check_count(mesh.tangents.size(), "TANGENT");
+        }
         for (std::uint32_t set = 0; set < texcoord_sets_of(material); ++set) {
             const std::string key = "TEXCOORD_" + std::to_string(set);
             std::vector<glm::vec2> texcoords(count);
@@ -685,9 +706,10 @@ private:
         return mesh;
     }
 
-    // Returns 1 + the highest set of texture coordinates that the textures of a material use; 0 without textures.
+    // Returns 1 + the highest set of texture coordinates that a material needs; 0 if it needs none.
     std::uint32_t texcoord_sets_of(std::uint32_t material) const {
-        std::uint32_t sets = 0;
+        const auto of_normals = normal_texcoord_set_of(material);
+        std::uint32_t sets = of_normals ? *of_normals + 1 : 0;
         for (const std::uint32_t texture : textures_of(builder_.material(material)))
             if (texture != ARHOST_NONE)
                 sets = std::max(sets, builder_.texture(texture).texcoord_set + 1);
@@ -697,6 +719,54 @@ private:
         return std::ranges::any_of(textures_of(builder_.material(material)), [&](std::uint32_t texture) {
             return texture != ARHOST_NONE && builder_.texture(texture).texcoord_set == set;
         });
+    }
+
+    // Returns the set of texture coordinates along which a material needs tangents; std::nullopt if it needs none. A
+    // texture that is turned or mirrored needs other tangents, which ray tracers compute for each triangle.
+    std::optional<std::uint32_t> normal_texcoord_set_of(std::uint32_t material) const {
+        const arhost_material &of = builder_.material(material);
+        for (const std::uint32_t texture :
+             {of.normal_texture, of.anisotropy > 0 ? of.anisotropy_texture : ARHOST_NONE,
+              of.clearcoat_normal_texture})
+            if (texture != ARHOST_NONE) {
+                const glm::mat3x2 &m = builder_.texture(texture).image_from_texcoord;
+                if (m[0].x > 0 && m[1].y > 0 && m[0].y == 0 && m[1].x == 0)
+                    return builder_.texture(texture).texcoord_set;
+                return std::nullopt;
+            }
+        return of.anisotropy > 0 ? std::optional(0u) : std::nullopt;
+    }
+
+    void complete_tangents(TriangleMesh &mesh, std::uint32_t material) const {
+        const auto set = normal_texcoord_set_of(material);
+        if (set && mesh.texcoords.size() / mesh.positions.size() > *set)
+            add_tangents(mesh, *set);
+    }
+
+    std::vector<glm::vec4> tangents_of(int accessor) const {
+        auto tangents = vectors<glm::vec4>(accessors_.read<float>(accessor, TINYGLTF_TYPE_VEC4, "TANGENT"));
+        for (glm::vec4 &tangent : tangents) {
+            const float length = glm::length(glm::vec3(tangent));
+            tangent = length > 1e-6f && length < 1e6f
+                          ? glm::vec4(glm::vec3(tangent) / length, tangent.w < 0 ? -1.f : 1.f)
+                          : glm::vec4(0);
+        }
+        return tangents;
+    }
+
+    // KHR_lights_punctual
+    void add_lights() {
+        const GltfLights lights(content_.json, name_);
+        const double scale = std::cbrt(std::abs(glm::determinant(glm::dmat3(placed_.matrix()))));
+        for (const SceneNode &node : nodes_)
+            if (const auto light = json_of("nodes", node.file_node).extension("KHR_lights_punctual")) {
+                if (builder_.settings.integrator != ARHOST_INTEGRATOR_PATH)
+                    notice("lights are ignored; they need 'integrator: path'");
+                else if (node.moves || placement_.node != ARHOST_NONE)
+                    notice("lights that move are ignored");
+                else
+                    builder_.add_light(lights.at(*light, node.placement_from_node, scale));
+            }
     }
 
     std::vector<glm::u16vec4> colours_of(int accessor) const {
@@ -939,6 +1009,10 @@ private:
     }
 
     void finish(Part &part, const Motion &motion) {
+        if (part.deforms)
+            part.mesh.tangents.clear();
+        else
+            complete_tangents(part.mesh, part.material);
         builder_.add_object(part.name, builder_.add_triangles(std::move(part.mesh)), part.material, placement_.role,
                             glm::mat4x3(1), motion, part.hides_back_faces);
     }

@@ -39,6 +39,7 @@ struct GltfPlacement {
     std::vector<std::string> animations{};
     bool loops = true;                    // false: the animations play once
     float speed = 1;                      // > 0
+    bool has_lights = true;               // adds the lights of the file
     std::optional<std::string> variant{}; // name of a material variant; absent: the materials of the primitives
     // Files and folders, without links, from which buffers and images may be read, besides the file's own folder.
     std::span<const std::filesystem::path> reads{};

@@ -75,6 +75,9 @@ GltfMaterials::Material GltfMaterials::read(const JsonNode &node) {
     read_specular(node, material);
     read_transmission(node, material);
     read_clearcoat(node, material);
+    read_sheen(node, material);
+    read_anisotropy(node, material);
+    read_iridescence(node, material);
     const bool is_volume = material.transmission > 0 && material.thin_walled == 0; // its back faces end it
     return {builder_.add_material(material), node.boolean_or("doubleSided", false) || is_volume};
 }
@@ -161,6 +164,42 @@ void GltfMaterials::read_clearcoat(const JsonNode &node, arhost_material &materi
         material.clearcoat_normal_texture = texture_of(*clearcoat, "clearcoatNormalTexture", false);
         material.clearcoat_normal_scale = texture->number_or("scale", 1, -largest_number, largest_number);
     }
+}
+
+void GltfMaterials::read_sheen(const JsonNode &node, arhost_material &material) {
+    const auto sheen = node.extension("KHR_materials_sheen");
+    if (!sheen)
+        return;
+    copy(sheen->numbers_or<3>("sheenColorFactor", {0, 0, 0}, 0, 1), material.sheen);
+    material.sheen_texture = texture_of(*sheen, "sheenColorTexture", true);
+    material.sheen_roughness = sheen->number_or("sheenRoughnessFactor", 0, 0, 1);
+    // Alpha is linear in colours, too; often, one image has both.
+    material.sheen_roughness_texture = texture_of(*sheen, "sheenRoughnessTexture", true);
+}
+
+void GltfMaterials::read_anisotropy(const JsonNode &node, arhost_material &material) {
+    const auto anisotropy = node.extension("KHR_materials_anisotropy");
+    if (!anisotropy)
+        return;
+    material.anisotropy = anisotropy->number_or("anisotropyStrength", 0, 0, 1);
+    const float angle = anisotropy->number_or("anisotropyRotation", 0, -largest_number, largest_number);
+    copy(std::array{std::cos(angle), std::sin(angle)}, material.anisotropy_direction);
+    material.anisotropy_texture = texture_of(*anisotropy, "anisotropyTexture", false);
+}
+
+void GltfMaterials::read_iridescence(const JsonNode &node, arhost_material &material) {
+    const auto iridescence = node.extension("KHR_materials_iridescence");
+    if (!iridescence)
+        return;
+    material.iridescence = iridescence->number_or("iridescenceFactor", 0, 0, 1);
+    material.iridescence_texture = texture_of(*iridescence, "iridescenceTexture", false);
+    material.iridescence_index = iridescence->number_or("iridescenceIor", 1.3f, 1, 4);
+    const auto thickness = [&](const char *key, float fallback) {
+        return iridescence->number_or(key, fallback, 0, film_thickness_limit_nm);
+    };
+    copy(std::array{thickness("iridescenceThicknessMinimum", 100), thickness("iridescenceThicknessMaximum", 400)},
+         material.iridescence_thickness_nm);
+    material.iridescence_thickness_texture = texture_of(*iridescence, "iridescenceThicknessTexture", false);
 }
 
 std::uint32_t GltfMaterials::texture_of(const JsonNode &parent, const char *key, bool is_colour) {

@@ -37,6 +37,9 @@ private:
     void read_specular(const JsonNode &node, arhost_material &material);
     void read_transmission(const JsonNode &node, arhost_material &material);
     void read_clearcoat(const JsonNode &node, arhost_material &material);
+    void read_sheen(const JsonNode &node, arhost_material &material);
+    void read_anisotropy(const JsonNode &node, arhost_material &material);
+    void read_iridescence(const JsonNode &node, arhost_material &material);
     // Returns ARHOST_NONE if `parent` has no such texture.
     std::uint32_t texture_of(const JsonNode &parent, const char *key, bool is_colour);
 

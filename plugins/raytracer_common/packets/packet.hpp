@@ -389,9 +389,11 @@ ARHOST_INLINE Float turn_of(Float x, Float y) {
 #include <arhost/shading/leaf/alpha.h>
 #include <arhost/shading/leaf/bsdf.h>
 #include <arhost/shading/leaf/environment.h>
+#include <arhost/shading/leaf/film.h>
 #include <arhost/shading/leaf/lens.h>
 #include <arhost/shading/leaf/light.h>
 #include <arhost/shading/leaf/sampling.h>
+#include <arhost/shading/leaf/sheen.h>
 #include <arhost/shading/leaf/surface.h>
 #undef ARHOST_LEAF
 #undef ARHOST_UNARY

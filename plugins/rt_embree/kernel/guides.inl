@@ -11,7 +11,8 @@ ARHOST_INLINE Bool is_seen_through(const Scene &scene, const Object &object, con
     if (object.blends) {
         Float opacity = Float(material.opacity) * vertex_colour(object, hit, here).alpha;
         if (material.colour_texture != ARHOST_NONE)
-            opacity = opacity * sample_object_texture(scene, object, material.colour_texture, hit, here).alpha;
+            opacity =
+                opacity * sample_object_texture(scene, object, material.colour_texture, hit, here, Float(0.0f)).alpha;
         through = opacity < Float(1.0f);
     }
     constexpr float clear = 0.05f; // roughness
@@ -19,8 +20,9 @@ ARHOST_INLINE Bool is_seen_through(const Scene &scene, const Object &object, con
         material.roughness <= clear) {
         Float transmission = Float(material.transmission);
         if (material.transmission_texture != ARHOST_NONE)
-            transmission = transmission *
-                           sample_object_texture(scene, object, material.transmission_texture, hit, here).colour.x;
+            transmission =
+                transmission *
+                sample_object_texture(scene, object, material.transmission_texture, hit, here, Float(0.0f)).colour.x;
         through = through | (transmission > Float(0.5f));
     }
     return here & through;

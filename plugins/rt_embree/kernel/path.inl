@@ -116,8 +116,7 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
     const Pair uv = path_pair(work, paths, scatter_dimension);
     Vec3 out = cosine_direction(s.normal, uv.u, uv.v);
     if (s.any_rough && any(specular & scatters))
-        out = select(specular, mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v)),
-                     out);
+        out = select(specular, mirror_direction(direction, half_vector_of(s, to_eye, uv)), out);
     if (const Bool by_coat = choice.u >= below; s.any_coat && any(by_coat & scatters))
         out = select(by_coat,
                      mirror_direction(direction, ggx_half_vector(s.coat_normal, to_eye, s.coat_alpha, uv.u, uv.v)),
@@ -178,10 +177,14 @@ ARHOST_FUNCTION void shade_path(Work &work, const RTCRayHit16 &rays, const Bool 
     Bool active = hit;
     Paths paths = from;
     Surface s = surface_at(scene, rays, active);
-    if (work.frame.denoising && s.any_rough)
+    if (work.frame.denoising && s.any_rough) {
         s.alpha = select((paths.inverse_density == Float(0.0f)) | (s.transmission > Float(0.0f)), s.alpha,
                          max(s.alpha, Float(least_scattered_alpha)));
+        s.tangent_alpha = max(s.tangent_alpha, s.alpha);
+    }
     const Vec3 direction = normalize(direction_of(rays.ray));
+    if (s.any_rough)
+        bend_normals(s, -direction);
     if (paths.depth > 0)
         active = active & ~(s.is_real & sees_only_virtual(paths));
     paths.pixel = paths.pixel & Int(filmed_bit - 1);

@@ -13,7 +13,8 @@ struct LobeChances {
 ARHOST_INLINE Float specular_chance(const Surface &s, Vec3 to_eye) {
     if (!s.any_rough)
         return Float(0.0f);
-    const Float specular = luminance(fresnel_of(s, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
+    const Float specular = luminance(fresnel_of(s, dot(s.normal, to_eye)));
+    const Float diffuse = luminance(s.any_sheen ? s.diffuse + s.sheen : s.diffuse);
     const Float chance = specular / max(specular + diffuse, Float(1e-6f));
     const Float bounded = min(max(chance, Float(0.1f)), Float(0.9f));
     return select(s.is_rough, select(diffuse > Float(0.0f), bounded, Float(1.0f)), Float(0.0f));
@@ -38,6 +39,11 @@ ARHOST_INLINE Vec3 highlight(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     return select(s.is_rough, black(), s.specular * phong(s.normal, to_light, to_eye, s.exponent));
 }
 
+// Returns the share of the light to the eye that passes the fibres.
+ARHOST_INLINE Float below_sheen(const Surface &s, Vec3 to_eye) {
+    return Float(1.0f) - largest(s.sheen) * sheen_albedo(dot(s.normal, to_eye), s.sheen_roughness);
+}
+
 // Returns π · BSDF · cosine of a lit surface, without highlight().
 ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     const Float cosine = lambert(s.normal, to_light);
@@ -45,10 +51,14 @@ ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     if (s.any_rough) {
         const Vec3 half_vector = normalize(to_light + to_eye);
         const Vec3 fresnel = fresnel_of(s, dot(to_eye, half_vector));
-        const Float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+        const Float lobe = rough_lobe(s, to_eye, to_light, half_vector);
         scattered =
             select(s.is_rough, s.diffuse * passing_fresnel(s, dot(to_eye, half_vector)) * cosine + fresnel * lobe,
                    scattered);
+        if (s.any_sheen)
+            scattered = scattered * below_sheen(s, to_eye) +
+                        s.sheen * sheen_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector),
+                                             s.sheen_roughness * s.sheen_roughness);
         if (s.any_coat) {
             const Float coat = s.coat * coat_reflectance(dot(to_eye, half_vector)) *
                                ggx_lobe(lambert(s.coat_normal, to_light), dot(s.coat_normal, to_eye),
@@ -62,8 +72,7 @@ ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light) {
 // Returns the part of scattering() that the specular lobe of a rough surface reflects.
 ARHOST_INLINE Vec3 gloss(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     const Vec3 half_vector = normalize(to_light + to_eye);
-    const Float lobe =
-        ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+    const Float lobe = rough_lobe(s, to_eye, to_light, half_vector);
     return select(s.is_rough, fresnel_of(s, dot(to_eye, half_vector)) * lobe, black());
 }
 
@@ -71,11 +80,8 @@ ARHOST_INLINE Vec3 gloss(const Surface &s, Vec3 to_eye, Vec3 to_light) {
 ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, Float chance) {
     Float density = lambert(s.normal, to_light) * Float(0.318309886f) * (Float(1.0f) - chance);
     if (s.any_rough)
-        density =
-            density + select(s.is_rough,
-                             chance * ggx_reflection_density(dot(s.normal, to_eye),
-                                                             dot(s.normal, normalize(to_light + to_eye)), s.alpha),
-                             Float(0.0f));
+        density = density + select(s.is_rough, chance * reflection_density(s, to_eye, normalize(to_light + to_eye)),
+                                   Float(0.0f));
     return select(dot(to_light, s.geometric_normal) > Float(0.0f), density, Float(0.0f));
 }
 

@@ -175,6 +175,39 @@ struct RoughReflection {
     Float density; // per steradian
     Bool leaves;   // the ray goes away from the surface
 };
+
+// Bends the normals of rough virtual surfaces so that they reflect the eye's rays away from the surface.
+ARHOST_INLINE void bend_normals(Surface &s, Vec3 to_eye) {
+    s.normal = select(s.is_rough & ~s.is_real, reflecting_normal(s.normal, s.geometric_normal, to_eye), s.normal);
+    if (s.any_coat)
+        s.coat_normal = reflecting_normal(s.coat_normal, s.geometric_normal, to_eye);
+    if (s.any_anisotropic) {
+        s.tangent = tangent_of(s.normal, s.tangent, tangent_axis(s.normal));
+        s.bitangent = cross(s.normal, s.tangent);
+    }
+}
+
+// Microfacets of a rough surface. Vectors are in world coordinates.
+ARHOST_INLINE Vec3 in_tangents(const Surface &s, Vec3 a) {
+    return {dot(a, s.tangent), dot(a, s.bitangent), dot(a, s.normal)};
+}
+ARHOST_INLINE Vec3 half_vector_of(const Surface &s, Vec3 to_eye, Pair uv) {
+    return s.any_anisotropic ? anisotropic_half_vector(s.tangent, s.bitangent, s.normal, to_eye, s.tangent_alpha,
+                                                       s.alpha, uv.u, uv.v)
+                             : ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v);
+}
+ARHOST_INLINE Float reflection_density(const Surface &s, Vec3 to_eye, Vec3 half_vector) {
+    return s.any_anisotropic ? anisotropic_reflection_density(in_tangents(s, to_eye), in_tangents(s, half_vector),
+                                                              s.tangent_alpha, s.alpha)
+                             : ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+}
+ARHOST_INLINE Float rough_lobe(const Surface &s, Vec3 to_eye, Vec3 to_light, Vec3 half_vector) {
+    return s.any_anisotropic
+               ? anisotropic_lobe(in_tangents(s, to_light), in_tangents(s, to_eye), in_tangents(s, half_vector),
+                                  s.tangent_alpha, s.alpha)
+               : ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+}
+
 ARHOST_INLINE RoughReflection sample_rough(const Surface &s, Vec3 to_eye, Pair uv) {
     const Vec3 half_vector = ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v);
     const Vec3 direction = mirror_direction(-to_eye, half_vector);

@@ -24,12 +24,19 @@ struct Surface {
     Vec3 transmitted;
     Float coat, coat_alpha; // share of a clear coat, and its GGX roughness parameter
     Vec3 coat_normal;
+    Vec3 sheen; // of fibres
+    Float sheen_roughness;
+    // Valid if any_anisotropic: unit vectors, orthogonal to `normal`, and the GGX roughness parameter along
+    // `tangent`; `alpha` is along `bitangent`.
+    Vec3 tangent, bitangent;
+    Float tangent_alpha;
     Bool is_lit;   // shaded by direct light: neither a mirror nor glass nor unlit
     Bool is_unlit; // only `emission` is seen
     Bool is_rough; // has a metallic-roughness material; `specular` is then the reflectance at normal incidence
     Bool is_real;  // a catcher or occluder
     // Whether any lane has the property. A surface with any_scattering spawns secondary rays.
-    bool any_specular, any_rough, any_scattering, any_translucent, any_transmission, any_coat;
+    bool any_specular, any_rough, any_scattering, any_translucent, any_transmission, any_coat, any_sheen,
+        any_anisotropic;
     // The reflectance of the non-metallic part of a rough surface, at normal and at grazing incidence. The light that
     // it does not reflect reaches the diffuse layer.
     Vec3 dielectric;
@@ -79,19 +86,40 @@ ARHOST_INLINE Texcoord texcoord_of(const Object &object, const Texture &texture,
 }
 
 // Samples a texture at the hits; returns white if the object has no texture coordinates. `texture`: an index, not
-// ARHOST_NONE.
+// ARHOST_NONE. `footprint`: result of footprint_of(), or 0.
 ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &object, std::uint32_t texture,
-                                          const RTCHit16 &hit, Bool here) {
+                                          const RTCHit16 &hit, Bool here, Float footprint) {
     if (!object.texcoords)
         return {white(), Float(1.0f)};
     const Corners corners = corners_of(object, hit, here);
     Float u = 0.0f, v = 0.0f;
+    Texcoord at[3];
     for (int i = 0; i < 3; ++i) {
-        const Texcoord at = texcoord_of(object, scene.textures[texture], corners.vertex[i]);
-        u = u + at.u * corners.weight[i];
-        v = v + at.v * corners.weight[i];
+        at[i] = texcoord_of(object, scene.textures[texture], corners.vertex[i]);
+        u = u + at[i].u * corners.weight[i];
+        v = v + at[i].v * corners.weight[i];
     }
-    return sample_texture(scene.linear_of_srgb8, scene.textures[texture], u, v);
+    const Float area = abs((at[1].u - at[0].u) * (at[2].v - at[0].v) - (at[2].u - at[0].u) * (at[1].v - at[0].v));
+    return sample_texture(scene.linear_of_srgb8, scene.textures[texture], u, v, area * footprint);
+}
+
+// Returns the area that a sample from the eye covers on the triangles, as a multiple of half the area of the
+// triangle. `distance`: from the eye, mm; `facing`: cosine of the angle between the ray and the normal.
+ARHOST_INLINE Float footprint_of(const Scene &scene, const Object &object, const RTCHit16 &hit, Bool here,
+                                 Float distance, Float facing) {
+    if (!object.texcoords || scene.ray_angle == 0)
+        return Float(0.0f);
+    const Corners corners = corners_of(object, hit, here);
+    Vec3 position[3];
+    for (int i = 0; i < 3; ++i)
+        position[i] = gather_vector(object.positions, object.position_stride, corners.vertex[i]);
+    Vec3 edge_1 = position[1] - position[0], edge_2 = position[2] - position[0];
+    if (object.has_transform) {
+        edge_1 = transform(object.transform, edge_1);
+        edge_2 = transform(object.transform, edge_2);
+    }
+    const Float width = distance * Float(scene.ray_angle);
+    return width * width / max(length(cross(edge_1, edge_2)) * max(abs(facing), Float(0.01f)), Float(1e-30f));
 }
 
 // Returns the linear colour and the opacity of the vertices at the hits; white if the object has none.
@@ -112,29 +140,75 @@ ARHOST_INLINE Texel vertex_colour(const Object &object, const RTCHit16 &hit, Boo
     return {{sum[0], sum[1], sum[2]}, sum[3]};
 }
 
-// Returns `normal`, perturbed by a normal map. `facet` is the geometric normal. The tangents are constant over each
-// triangle. `texture`: an index; `scale`: of the perturbation.
-ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, std::uint32_t texture, float scale,
-                                 Vec3 facet, Vec3 normal, const RTCHit16 &hit, Bool here) {
+// The directions in which the texture coordinates u and v increase, not of unit length.
+struct Tangents {
+    Vec3 along_u, along_v;
+};
+
+// Returns the interpolated tangents of the vertices; if there are none, those of the triangles. `lookup`: the texture
+// that has the texture coordinates. The object must have texture coordinates or tangents.
+ARHOST_INLINE Tangents tangents_of(const Object &object, const Texture &lookup, const RTCHit16 &hit, Bool here) {
     const Corners corners = corners_of(object, hit, here);
+    if (object.tangents) {
+        Tangents sum{black(), black()};
+        for (int i = 0; i < 3; ++i) {
+            const Vec3 along = gather_vector(object.tangents, object.tangent_stride, corners.vertex[i]) *
+                               corners.weight[i],
+                       normal = gather_vector(object.normals, object.normal_stride, corners.vertex[i]);
+            const Float side =
+                gather(object.tangents + 3, corners.vertex[i] * Int(static_cast<int>(object.tangent_stride / 4)));
+            sum.along_u = sum.along_u + along;
+            sum.along_v = sum.along_v - cross(normal, along) * side;
+        }
+        return sum;
+    }
     Vec3 position[3];
     Float u[3], v[3];
     for (int i = 0; i < 3; ++i) {
         position[i] = gather_vector(object.positions, object.position_stride, corners.vertex[i]);
-        const Texcoord at = texcoord_of(object, scene.textures[texture], corners.vertex[i]);
+        const Texcoord at = texcoord_of(object, lookup, corners.vertex[i]);
         u[i] = at.u;
         v[i] = at.v;
     }
     const Vec3 edge_1 = position[1] - position[0], edge_2 = position[2] - position[0];
     const Float u1 = u[1] - u[0], u2 = u[2] - u[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
-    Vec3 along_u = tangent_along_u(edge_1, edge_2, u1, u2, v1, v2);
-    Vec3 along_v = tangent_along_v(edge_1, edge_2, u1, u2, v1, v2);
-    if (object.has_transform) {
-        along_u = transform(object.transform, along_u);
-        along_v = transform(object.transform, along_v);
+    return {tangent_along_u(edge_1, edge_2, u1, u2, v1, v2), tangent_along_v(edge_1, edge_2, u1, u2, v1, v2)};
+}
+
+ARHOST_INLINE Tangents tangents_in_world(const Object &object, const Texture &lookup, const RTCHit16 &hit,
+                                         Bool here) {
+    const Tangents t = tangents_of(object, lookup, hit, here);
+    return object.has_transform
+               ? Tangents{transform(object.transform, t.along_u), transform(object.transform, t.along_v)}
+               : t;
+}
+
+// Returns `normal`, perturbed by a normal map. `facet` is the geometric normal. `texture`: an index; `scale`: of the
+// perturbation; `footprint`: as in sample_object_texture().
+ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, std::uint32_t texture, float scale,
+                                 Vec3 facet, Vec3 normal, const RTCHit16 &hit, Bool here, Float footprint) {
+    const Tangents tangents = tangents_in_world(object, scene.textures[texture], hit, here);
+    const Vec3 texel = sample_object_texture(scene, object, texture, hit, here, footprint).colour;
+    return perturbed_normal(normal, facet, tangents.along_u, tangents.along_v, texel, Float(scale));
+}
+
+// An anisotropic material at the hits: the direction of its texture, in units of the tangents, and its strength.
+struct Anisotropy {
+    Float along_u, along_v, strength;
+};
+ARHOST_INLINE Anisotropy anisotropy_of(const Scene &scene, const Object &object, const RTCHit16 &hit, Bool here,
+                                       Float footprint) {
+    const arhost_material &material = *object.material;
+    const Float c = material.anisotropy_direction[0], s = material.anisotropy_direction[1];
+    Float x = 1.0f, y = 0.0f, strength = material.anisotropy;
+    if (material.anisotropy_texture != ARHOST_NONE) {
+        const Vec3 texel =
+            sample_object_texture(scene, object, material.anisotropy_texture, hit, here, footprint).colour;
+        x = texel.x * Float(2.0f) - Float(1.0f);
+        y = texel.y * Float(2.0f) - Float(1.0f);
+        strength = strength * texel.z;
     }
-    const Vec3 texel = sample_object_texture(scene, object, texture, hit, here).colour;
-    return perturbed_normal(normal, facet, along_u, along_v, texel, Float(scale));
+    return {x * c - y * s, -(x * s + y * c), strength}; // the second axis of the texture is along −v
 }
 
 // Returns the vectors, in object space, from the hits to the curved surface that the vertex normals describe
@@ -161,6 +235,19 @@ ARHOST_INLINE Float below_coat(const Surface &s, Vec3 to_eye) {
     return Float(1.0f) - s.coat * coat_reflectance(dot(s.coat_normal, to_eye));
 }
 
+// Replaces the reflectances of the share `film` of a surface by those under a thin film. `cosine`: of the angle
+// between the normal and the eye, whose film all microfacets have.
+ARHOST_INLINE void add_film(Surface &s, Float film, Float index, Float thickness_nm, Float cosine) {
+    const auto under_film = [&](Vec3 f0, Float f90) {
+        const Vec3 seen = film_reflectance(f0, index, thickness_nm, cosine);
+        const Vec3 inverse{schlick_inverse(seen.x, f90, cosine), schlick_inverse(seen.y, f90, cosine),
+                           schlick_inverse(seen.z, f90, cosine)};
+        return f0 + (inverse - f0) * film;
+    };
+    s.specular = under_film(s.specular, s.edge_reflectance);
+    s.dielectric = under_film(s.dielectric, s.dielectric_edge);
+}
+
 ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bool active) {
     const RTCHit16 &hit = rays.hit;
     const Vec3 direction = direction_of(rays.ray);
@@ -176,7 +263,12 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     s.any_specular = s.any_rough = s.any_scattering = s.any_translucent = s.any_transmission = s.any_coat = false;
     s.transmission = s.coat = Float(0.0f);
     s.transmitted = black();
-    s.coat_alpha = Float(1.0f);
+    s.coat_alpha = s.sheen_roughness = Float(1.0f);
+    s.sheen = s.tangent = s.bitangent = black();
+    s.tangent_alpha = Float(0.0f);
+    s.any_sheen = s.any_anisotropic = false;
+    bool any_film = false;
+    Float film = 0.0f, film_index = 1.0f, film_nm = 0.0f;
     s.position = origin_of(rays.ray) + step;
     s.distance = length(step);
     s.geometric_normal = facet;
@@ -199,10 +291,12 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             normal = transform(object.normal_transform, normal);
         }
         const Vec3 vertex_normal = normal;
+        const Float footprint = footprint_of(scene, object, hit, here, s.distance,
+                                             dot(normalize_or(geometric, -direction), normalize(direction)));
         if (object.material->model == ARHOST_MATERIAL_METALLIC_ROUGHNESS &&
             object.material->normal_texture != ARHOST_NONE && object.texcoords)
             normal = mapped_normal(scene, object, object.material->normal_texture, object.material->normal_scale,
-                                   geometric, normal, hit, here);
+                                   geometric, normal, hit, here, footprint);
         extent = select(here, splat(object.extent), extent);
         s.geometric_normal = select(here, geometric, s.geometric_normal);
         s.normal = select(here, normal, s.normal);
@@ -223,7 +317,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         Vec3 ambient = splat(material.ambient), diffuse = splat(material.diffuse);
         Float opacity = material.opacity;
         if (material.colour_texture != ARHOST_NONE) {
-            const Texel texel = sample_object_texture(scene, object, material.colour_texture, hit, here);
+            const Texel texel = sample_object_texture(scene, object, material.colour_texture, hit, here, footprint);
             ambient = ambient * texel.colour;
             diffuse = diffuse * texel.colour;
             opacity = opacity * texel.alpha;
@@ -245,7 +339,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         if (material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS && material.occlusion_texture != ARHOST_NONE &&
             scene.has_ambient) {
             const Float occlusion =
-                sample_object_texture(scene, object, material.occlusion_texture, hit, here).colour.x;
+                sample_object_texture(scene, object, material.occlusion_texture, hit, here, footprint).colour.x;
             ambient = ambient * (Float(1.0f) + (occlusion - Float(1.0f)) * Float(material.occlusion_strength));
         }
         if (material.model == ARHOST_MATERIAL_SPECULAR || material.model == ARHOST_MATERIAL_METAL) {
@@ -257,17 +351,20 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             Float metallic = material.metallic, roughness = material.roughness;
             if (material.metallic_roughness_texture != ARHOST_NONE) {
                 const Vec3 factors =
-                    sample_object_texture(scene, object, material.metallic_roughness_texture, hit, here).colour;
+                    sample_object_texture(scene, object, material.metallic_roughness_texture, hit, here, footprint)
+                        .colour;
                 metallic = metallic * factors.z;
                 roughness = roughness * factors.y;
             }
             Float weight = material.specular_weight;
             if (material.specular_texture != ARHOST_NONE)
-                weight = weight * sample_object_texture(scene, object, material.specular_texture, hit, here).alpha;
+                weight = weight *
+                         sample_object_texture(scene, object, material.specular_texture, hit, here, footprint).alpha;
             Vec3 dielectric = splat(material.specular) * normal_reflectance(Float(material.index));
             if (material.specular_colour_texture != ARHOST_NONE)
-                dielectric = dielectric *
-                             sample_object_texture(scene, object, material.specular_colour_texture, hit, here).colour;
+                dielectric = dielectric * sample_object_texture(scene, object, material.specular_colour_texture, hit,
+                                                                here, footprint)
+                                              .colour;
             dielectric =
                 Vec3{min(dielectric.x, Float(1.0f)), min(dielectric.y, Float(1.0f)), min(dielectric.z, Float(1.0f))} *
                 weight;
@@ -279,9 +376,9 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             if (material.transmission > 0) {
                 Float transmission = (Float(1.0f) - metallic) * Float(material.transmission);
                 if (material.transmission_texture != ARHOST_NONE)
-                    transmission =
-                        transmission *
-                        sample_object_texture(scene, object, material.transmission_texture, hit, here).colour.x;
+                    transmission = transmission * sample_object_texture(scene, object, material.transmission_texture,
+                                                                        hit, here, footprint)
+                                                      .colour.x;
                 s.transmission = select(here, transmission, s.transmission);
                 s.transmitted = select(
                     here, material.thin_walled ? diffuse : Vec3{sqrt(diffuse.x), sqrt(diffuse.y), sqrt(diffuse.z)},
@@ -292,20 +389,72 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
                 Float coat = material.clearcoat, coat_roughness = material.clearcoat_roughness;
                 if (material.clearcoat_texture != ARHOST_NONE)
                     coat =
-                        coat * sample_object_texture(scene, object, material.clearcoat_texture, hit, here).colour.x;
+                        coat * sample_object_texture(scene, object, material.clearcoat_texture, hit, here, footprint)
+                                   .colour.x;
                 if (material.clearcoat_roughness_texture != ARHOST_NONE)
                     coat_roughness =
-                        coat_roughness *
-                        sample_object_texture(scene, object, material.clearcoat_roughness_texture, hit, here)
-                            .colour.y;
+                        coat_roughness * sample_object_texture(scene, object, material.clearcoat_roughness_texture,
+                                                               hit, here, footprint)
+                                             .colour.y;
                 Vec3 coat_normal = vertex_normal;
                 if (material.clearcoat_normal_texture != ARHOST_NONE && object.texcoords)
-                    coat_normal = mapped_normal(scene, object, material.clearcoat_normal_texture,
-                                                material.clearcoat_normal_scale, geometric, coat_normal, hit, here);
+                    coat_normal =
+                        mapped_normal(scene, object, material.clearcoat_normal_texture,
+                                      material.clearcoat_normal_scale, geometric, coat_normal, hit, here, footprint);
                 s.coat = select(here, coat, s.coat);
                 s.coat_alpha = select(here, ggx_alpha(coat_roughness), s.coat_alpha);
                 s.coat_normal = select(here, coat_normal, s.coat_normal);
                 s.any_coat = true;
+            }
+            if (object.has_sheen) {
+                Vec3 sheen = splat(material.sheen);
+                Float sheen_roughness = material.sheen_roughness;
+                if (material.sheen_texture != ARHOST_NONE)
+                    sheen = sheen *
+                            sample_object_texture(scene, object, material.sheen_texture, hit, here, footprint).colour;
+                if (material.sheen_roughness_texture != ARHOST_NONE)
+                    sheen_roughness =
+                        sheen_roughness *
+                        sample_object_texture(scene, object, material.sheen_roughness_texture, hit, here, footprint)
+                            .alpha;
+                s.sheen = select(here, sheen, s.sheen);
+                s.sheen_roughness = select(here, sheen_roughness_of(sheen_roughness), s.sheen_roughness);
+                s.any_sheen = true;
+            }
+            if (object.is_anisotropic && (object.texcoords || object.tangents)) {
+                const Anisotropy anisotropy = anisotropy_of(scene, object, hit, here, footprint);
+                const Texture plain{};
+                const Tangents tangents = tangents_in_world(
+                    object,
+                    material.anisotropy_texture != ARHOST_NONE ? scene.textures[material.anisotropy_texture] : plain,
+                    hit, here);
+                const Vec3 along_u = normalize_or(tangents.along_u, black()),
+                           along_v = normalize_or(tangents.along_v, black());
+                const Float across = ggx_alpha(roughness);
+                s.tangent = select(here, along_u * anisotropy.along_u + along_v * anisotropy.along_v, s.tangent);
+                s.tangent_alpha =
+                    select(here, across + anisotropy.strength * anisotropy.strength * (Float(1.0f) - across),
+                           s.tangent_alpha);
+                s.any_anisotropic = true;
+            }
+            if (object.has_film) {
+                Float share = material.iridescence, thickness_nm = material.iridescence_thickness_nm[1];
+                if (material.iridescence_texture != ARHOST_NONE)
+                    share = share *
+                            sample_object_texture(scene, object, material.iridescence_texture, hit, here, footprint)
+                                .colour.x;
+                if (material.iridescence_thickness_texture != ARHOST_NONE) {
+                    const Float least = material.iridescence_thickness_nm[0];
+                    thickness_nm =
+                        least + (thickness_nm - least) * sample_object_texture(scene, object,
+                                                                               material.iridescence_thickness_texture,
+                                                                               hit, here, footprint)
+                                                             .colour.y;
+                }
+                film = select(here, share, film);
+                film_index = select(here, Float(material.iridescence_index), film_index);
+                film_nm = select(here, thickness_nm, film_nm);
+                any_film = true;
             }
             s.is_rough = s.is_rough | here;
             s.any_rough = true;
@@ -318,7 +467,8 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             Vec3 emission = splat(material.emission);
             if (material.emission_texture != ARHOST_NONE)
                 emission =
-                    emission * sample_object_texture(scene, object, material.emission_texture, hit, here).colour;
+                    emission *
+                    sample_object_texture(scene, object, material.emission_texture, hit, here, footprint).colour;
             s.emission = select(here, emission, s.emission);
         }
     });
@@ -332,5 +482,12 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         s.coat_normal = shading_normal(s.coat_normal, s.geometric_normal);
         s.emission = s.emission * below_coat(s, -normalize(direction));
     }
+    if (s.any_anisotropic) {
+        s.tangent_alpha = max(s.tangent_alpha, s.alpha);
+        s.tangent = tangent_of(s.normal, s.tangent, tangent_axis(s.normal));
+        s.bitangent = cross(s.normal, s.tangent);
+    }
+    if (any_film)
+        add_film(s, film, film_index, film_nm, -dot(s.normal, normalize(direction)));
     return s;
 }

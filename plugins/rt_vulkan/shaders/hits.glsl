@@ -76,10 +76,22 @@ vec2 texcoord_at(uint object, uint triangle, vec2 uv, uint number) {
     return sum;
 }
 
-vec4 texel_at_hit(Hit hit, uint number) {
+// Returns twice the area of a triangle in a texture, in the unit of u times that of v.
+float area_in_texture(uint object, uint triangle, uint number) {
+    uint first = objects[object].first_index + 3u * triangle;
+    vec2 corner = texcoord_of(object, indices[first], number);
+    vec2 edge_1 = texcoord_of(object, indices[first + 1u], number) - corner;
+    vec2 edge_2 = texcoord_of(object, indices[first + 2u], number) - corner;
+    return abs(edge_1.x * edge_2.y - edge_2.x * edge_1.y);
+}
+
+// `footprint`: as in Surface.
+vec4 texel_at_hit(Hit hit, uint number, float footprint) {
     if (objects[hit.object].first_texcoord == NONE)
         return vec4(1.0);
-    return sample_texture(number, texcoord_at(hit.object, primitives[hit.primitive].number, hit.uv, number));
+    uint triangle = primitives[hit.primitive].number;
+    float area = footprint > 0.0 ? footprint * area_in_texture(hit.object, triangle, number) : 0.0;
+    return sample_texture(number, texcoord_at(hit.object, triangle, hit.uv, number), area);
 }
 
 // Returns the linear colour and the opacity of the vertices of a triangle; white if the object has none.
@@ -100,7 +112,7 @@ float opacity_at(uint object, uint triangle, vec2 uv) {
     uint material = objects[object].material, number = materials[material].colour_texture;
     float opacity = materials[material].opacity * vertex_colour(object, triangle, uv).a;
     if (has_textures && number != NONE && objects[object].first_texcoord != NONE)
-        opacity *= sample_texture(number, texcoord_at(object, triangle, uv, number)).a;
+        opacity *= sample_level(number, 0, texcoord_at(object, triangle, uv, number)).a;
     return opacity;
 }
 

@@ -48,7 +48,7 @@ bool is_seen_through(Hit hit) {
     float transmission = materials[material].transmission;
     if (!has_glass || !(transmission > 0.0) || materials[material].roughness > clear)
         return false;
-    return transmission * (has_textures && number != NONE ? texel_at_hit(hit, number).x : 1.0) > 0.5;
+    return transmission * (has_textures && number != NONE ? texel_at_hit(hit, number, 0.0).x : 1.0) > 0.5;
 }
 
 // Returns the number of the surface at a hit, as surface_number(). Surfaces that are seen through are specular.

@@ -184,7 +184,7 @@ vec3 arriving_from_environment(vec3 direction, float inverse_density, float samp
     if (frame.environment_texture != NONE) {
         vec3 d = frame.environment_from_world * direction;
         vec2 at = vec2(equirectangular_u(d), equirectangular_v(d));
-        light = sample_texture(frame.environment_texture, at).rgb * frame.environment_intensity;
+        light = sample_level(frame.environment_texture, 0, at).rgb * frame.environment_intensity;
         if (inverse_density > 0.0) {
             ivec2 size = ivec2(textures[frame.environment_texture].width, textures[frame.environment_texture].height);
             ivec2 texel = ivec2(clamp(at * vec2(size), vec2(0.0), vec2(size - 1)));
@@ -219,7 +219,7 @@ LightSample sample_environment(Surface s, vec2 sample_uv, uint count) {
     // The inverse of a rotation matrix is its transpose.
     vec3 direction = equirectangular_direction(u, v) * frame.environment_from_world;
     float density = environment_density(row_step.y, column_step.y, v);
-    vec3 light = sample_texture(frame.environment_texture, vec2(u, v)).rgb * frame.environment_intensity;
+    vec3 light = sample_level(frame.environment_texture, 0, vec2(u, v)).rgb * frame.environment_intensity;
     LightSample arriving = make_light_sample(s, direction, INFINITY, irradiance_of_density(density), light);
     arriving.sampling_density = density * float(count);
     return arriving;

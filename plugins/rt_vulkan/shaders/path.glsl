@@ -110,8 +110,8 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
     vec2 uv = path_pair(random, SCATTER_DIMENSION, 0u, 1u);
     bool is_coat = choice.x >= 1.0 - by_coat;
     vec3 to = is_coat || choice.x < specular * (1.0 - by_coat)
-                  ? mirror_direction(direction, ggx_half_vector(is_coat ? s.coat_normal : s.normal, to_eye,
-                                                                is_coat ? s.coat_alpha : s.alpha, uv.x, uv.y))
+                  ? mirror_direction(direction, is_coat ? ggx_half_vector(s.coat_normal, to_eye, s.coat_alpha, uv.x, uv.y)
+                                                        : half_vector_of(s, to_eye, uv))
                   : cosine_direction(s.normal, uv.x, uv.y);
     float density = scattering_density(s, to_eye, to, specular, by_coat);
     vec3 throughput = path.throughput * scattering(s, to_eye, to) *
@@ -239,6 +239,8 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     vec3 relative = vec3(1.0), before = vec3(0.0); // relative: factor of the reflected light
     if ((is_lit || is_unlit) && (receiver != CATCHER_SURFACE || has_gloss))
         add_material(s, hit, -direction);
+    if (s.is_rough && !s.is_real)
+        bend_normals(s, -direction);
     // The eye sees through a translucent surface in proportion to 1 − its opacity.
     float share = 1.0, lit_share = 1.0 - s.transmission;
     if (has_holes && s.opacity < 1.0 && is_of_eye(path)) {
@@ -250,8 +252,10 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     Path behind = path; // with the light of lamps before the surface
     path.throughput *= share;
     if (is_denoised()) {
-        if (path.inverse_density != 0.0 && !(s.transmission > 0.0))
+        if (path.inverse_density != 0.0 && !(s.transmission > 0.0)) {
             s.alpha = max(s.alpha, LEAST_SCATTERED_ALPHA);
+            s.tangent_alpha = max(s.tangent_alpha, s.alpha);
+        }
         if (path.depth == 0u && kind_of(guides.surface) != SPECULAR_SURFACE) {
             guides.position = s.position;
             guides.normal = s.normal;
@@ -406,7 +410,7 @@ void remove_covered(vec3 light, vec3 diffuse, uvec2 position, inout vec3 added, 
     transmittance = max(transmittance, 0.0);
     if (may_have_video && frame.has_video != 0u) {
         vec2 at = (vec2(position) + 0.5) / vec2(frame.width, frame.height);
-        vec3 video = max(sample_texture(frame.video_texture, at).rgb, vec3(1e-6));
+        vec3 video = max(sample_level(frame.video_texture, 0, at).rgb, vec3(1e-6));
         vec3 saturated = clamp(video * 5.0 - 4.0, 0.0, 1.0); // from 0.8 on
         transmittance *= max(vec3(1.0) - light / video, min(diffuse * saturated / video, 1.0));
     } else {

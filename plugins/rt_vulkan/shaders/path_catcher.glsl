@@ -153,6 +153,6 @@ bool filmed_towards(vec3 to_point, out vec3 light) {
     vec2 pixel = at.xy * frame.focal_length + frame.principal_point + 0.5, size = vec2(frame.width, frame.height);
     if (!all(greaterThan(pixel, vec2(0.0))) || !all(lessThan(pixel, size)))
         return false;
-    light = sample_texture(frame.video_texture, pixel / size).rgb;
+    light = sample_level(frame.video_texture, 0, pixel / size).rgb;
     return true;
 }

@@ -132,7 +132,7 @@ vec3 irradiance_without_objects(Surface s) {
     vec3 sum = frame.background;
     if (frame.environment_texture != NONE) {
         vec3 d = frame.environment_from_world * s.normal;
-        sum = sample_texture(frame.irradiance_texture, vec2(equirectangular_u(d), equirectangular_v(d))).rgb *
+        sum = sample_level(frame.irradiance_texture, 0, vec2(equirectangular_u(d), equirectangular_v(d))).rgb *
               frame.environment_intensity;
     }
     for (uint lamp = 0u; lamp < frame.light_count; ++lamp) {

@@ -6,7 +6,8 @@
 float specular_chance(Surface s, vec3 to_eye) {
     if (!s.is_rough)
         return 0.0;
-    float specular = luminance(fresnel_of(s, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
+    float specular = luminance(fresnel_of(s, dot(s.normal, to_eye)));
+    float diffuse = luminance(has_sheen ? s.diffuse + s.sheen : s.diffuse);
     return diffuse > 0.0 ? clamp(specular / max(specular + diffuse, 1e-6), 0.1, 0.9) : 1.0;
 }
 
@@ -29,8 +30,12 @@ vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
     float cosine = lambert(s.normal, to_light);
     if (s.is_rough) {
         vec3 half_vector = normalize(to_light + to_eye), fresnel = fresnel_of(s, dot(to_eye, half_vector));
-        float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+        float lobe = rough_lobe(s, to_eye, to_light, half_vector);
         vec3 scattered = s.diffuse * passing_fresnel(s, dot(to_eye, half_vector)) * cosine + fresnel * lobe;
+        if (has_sheen && largest(s.sheen) > 0.0)
+            scattered = scattered * below_sheen(s, to_eye) +
+                        s.sheen * sheen_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector),
+                                             s.sheen_roughness * s.sheen_roughness);
         if (has_coat && s.coat > 0.0)
             scattered = scattered * below_coat(s, to_eye) +
                         vec3(s.coat * coat_reflectance(dot(to_eye, half_vector)) *
@@ -44,8 +49,7 @@ vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
 // Returns the part of scattering() that the specular lobe of a rough surface reflects.
 vec3 gloss(Surface s, vec3 to_eye, vec3 to_light) {
     vec3 half_vector = normalize(to_light + to_eye);
-    return fresnel_of(s, dot(to_eye, half_vector)) *
-           ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+    return fresnel_of(s, dot(to_eye, half_vector)) * rough_lobe(s, to_eye, to_light, half_vector);
 }
 
 // Density per steradian of the rays that a lit surface scatters. `chance`: result of specular_chance(); `by_coat`: of
@@ -55,8 +59,7 @@ float scattering_density(Surface s, vec3 to_eye, vec3 to_light, float chance, fl
         return 0.0;
     float density = lambert(s.normal, to_light) * 0.318309886 * (1.0 - chance);
     if (s.is_rough)
-        density += chance * ggx_reflection_density(dot(s.normal, to_eye),
-                                                   dot(s.normal, normalize(to_light + to_eye)), s.alpha);
+        density += chance * reflection_density(s, to_eye, normalize(to_light + to_eye));
     if (has_coat && by_coat > 0.0)
         density += by_coat * (ggx_reflection_density(dot(s.coat_normal, to_eye),
                                                      dot(s.coat_normal, normalize(to_light + to_eye)), s.coat_alpha) -

@@ -34,7 +34,11 @@ layout(constant_id = 7) const bool may_have_video = true; // whether any image h
 layout(constant_id = 8) const bool has_gloss = true; // path integrator: whether a catcher may mirror virtual objects
 layout(constant_id = 9) const bool has_photons = true;    // whether any image has caustics of lamps
 layout(constant_id = 10) const bool may_denoise = true;   // path integrator: whether any image is denoised
-layout(constant_id = 11) const bool has_coat = true;      // path integrator: whether any material has a clear coat
+// Path integrator: whether any material has a clear coat, fibres, anisotropy, a thin film.
+layout(constant_id = 11) const bool has_coat = true;
+layout(constant_id = 12) const bool has_sheen = true;
+layout(constant_id = 13) const bool is_anisotropic = true;
+layout(constant_id = 14) const bool has_film = true;
 
 struct Object {
     mat4x3 object_from_world;
@@ -46,7 +50,7 @@ struct Object {
     // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on a
     // ball; 0 if the object is not sampled as a light source.
     float emitter_density;
-    uint first_colour, vertex_count, unused, unused_2; // first_colour: in `indices`; NONE if absent
+    uint first_colour, vertex_count, first_tangent, unused; // first_colour: in `indices`; NONE if absent
 };
 
 struct Material {
@@ -75,6 +79,14 @@ struct Material {
     uint specular_texture, specular_colour_texture, transmission_texture, thin_walled;
     float transmission, clearcoat, clearcoat_roughness, clearcoat_normal_scale;
     uint clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture, unused;
+    vec3 sheen;
+    float sheen_roughness;
+    uint sheen_texture, sheen_roughness_texture, anisotropy_texture, iridescence_texture;
+    vec2 anisotropy_direction;
+    float anisotropy, iridescence;
+    vec2 iridescence_thickness_nm;
+    float iridescence_index;
+    uint iridescence_thickness_texture;
 };
 
 struct Light {
@@ -95,7 +107,7 @@ struct Texture {
     int width, height;
     uint is_nearest, texcoord_set;
     vec2 image_from_texcoord[3];
-    vec2 unused;
+    uint level_count, unused;
 };
 
 // A node of a BVH. Inner nodes have count 0; their children are the nodes `first` and first + 1. A leaf contains
@@ -175,7 +187,7 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     float scene_extent;                     // mm: length of the diagonal of the scene's bounds
     uint photon_count, first_photon;        // of this frame; offset into the random sequence
     uint shown_parts;                       // of the change of a catcher's light: bits of path_catcher.glsl
-    uint unused;
+    float ray_angle; // width of a sample from the eye, in units of its distance; 0: textures are not filtered
 }
 frame;
 

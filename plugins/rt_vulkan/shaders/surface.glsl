@@ -23,6 +23,14 @@ struct Surface {
     vec3 transmitted;
     float coat, coat_alpha; // share of a clear coat, and its GGX roughness parameter
     vec3 coat_normal;
+    vec3 sheen; // of fibres
+    float sheen_roughness;
+    // Unit vectors, orthogonal to `normal`, and the GGX roughness parameter along `tangent`; `alpha` is along
+    // `bitangent`.
+    vec3 tangent, bitangent;
+    float tangent_alpha;
+    // The area that a sample from the eye covers, as a multiple of half the area of the triangle; 0: of no interest.
+    float footprint;
     // The reflectance of the non-metallic part of a rough surface, at normal and at grazing incidence. The light that it
     // does not reflect reaches the diffuse layer.
     vec3 dielectric;
@@ -47,6 +55,44 @@ float coat_reflectance(float cosine) {
 // Returns the share of the light to the eye that passes the clear coat.
 float below_coat(Surface s, vec3 to_eye) {
     return 1.0 - s.coat * coat_reflectance(dot(s.coat_normal, to_eye));
+}
+
+// Returns the share of the light to the eye that passes the fibres.
+float below_sheen(Surface s, vec3 to_eye) {
+    return 1.0 - largest(s.sheen) * sheen_albedo(dot(s.normal, to_eye), s.sheen_roughness);
+}
+
+// Bends the normals of a rough virtual surface so that it reflects the eye's rays away from the surface.
+void bend_normals(inout Surface s, vec3 to_eye) {
+    s.normal = reflecting_normal(s.normal, s.geometric_normal, to_eye);
+    if (has_coat)
+        s.coat_normal = reflecting_normal(s.coat_normal, s.geometric_normal, to_eye);
+    if (is_anisotropic) {
+        s.tangent = tangent_of(s.normal, s.tangent, tangent_axis(s.normal));
+        s.bitangent = cross(s.normal, s.tangent);
+    }
+}
+
+// Microfacets of a rough surface. Vectors are in world coordinates.
+vec3 in_tangents(Surface s, vec3 a) {
+    return vec3(dot(a, s.tangent), dot(a, s.bitangent), dot(a, s.normal));
+}
+vec3 half_vector_of(Surface s, vec3 to_eye, vec2 uv) {
+    if (is_anisotropic)
+        return anisotropic_half_vector(s.tangent, s.bitangent, s.normal, to_eye, s.tangent_alpha, s.alpha, uv.x, uv.y);
+    return ggx_half_vector(s.normal, to_eye, s.alpha, uv.x, uv.y);
+}
+float reflection_density(Surface s, vec3 to_eye, vec3 half_vector) {
+    if (is_anisotropic)
+        return anisotropic_reflection_density(in_tangents(s, to_eye), in_tangents(s, half_vector), s.tangent_alpha,
+                                              s.alpha);
+    return ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+}
+float rough_lobe(Surface s, vec3 to_eye, vec3 to_light, vec3 half_vector) {
+    if (is_anisotropic)
+        return anisotropic_lobe(in_tangents(s, to_light), in_tangents(s, to_eye), in_tangents(s, half_vector),
+                                s.tangent_alpha, s.alpha);
+    return ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
 }
 
 vec3 normal_at(uint object, uint number, vec2 uv) {
@@ -75,22 +121,58 @@ vec3 lift_of(Hit hit, float side) {
     return lift;
 }
 
-// Returns `normal`, perturbed by a normal texture. `facet` is the geometric normal. The tangents are constant over each
-// triangle. `number`: of the texture; `scale`: of the perturbation.
-vec3 normal_mapped(Hit hit, uint number, float scale, vec3 facet, vec3 normal) {
-    uint first = objects[hit.object].first_index + 3u * primitives[hit.primitive].number;
-    vec2 texcoords[3];
-    for (int i = 0; i < 3; ++i)
-        texcoords[i] = texcoord_of(hit.object, indices[first + uint(i)], number);
-    vec3 edge_1 = -primitives[hit.primitive].edge_1, edge_2 = primitives[hit.primitive].edge_2;
-    vec2 delta_1 = texcoords[1] - texcoords[0], delta_2 = texcoords[2] - texcoords[0];
-    vec3 along_u = tangent_along_u(edge_1, edge_2, delta_1.x, delta_2.x, delta_1.y, delta_2.y);
-    vec3 along_v = tangent_along_v(edge_1, edge_2, delta_1.x, delta_2.x, delta_1.y, delta_2.y);
-    if ((objects[hit.object].flags & HAS_TRANSFORM) != 0u) {
-        along_u = objects[hit.object].transform * along_u;
-        along_v = objects[hit.object].transform * along_v;
+// Returns the directions in world space, not of unit length, in which the texture coordinates of a texture increase:
+// interpolated from the vertices, or those of the triangle. `number`: of the texture; NONE: texcoord set 0 as it is.
+void tangents_of(Hit hit, uint number, out vec3 along_u, out vec3 along_v) {
+    uint object = hit.object, first = objects[object].first_index + 3u * primitives[hit.primitive].number;
+    along_u = along_v = vec3(0.0);
+    if (objects[object].first_tangent != NONE) {
+        vec3 weights = vec3(1.0 - hit.uv.x - hit.uv.y, hit.uv.x, hit.uv.y);
+        for (int i = 0; i < 3; ++i) {
+            uint vertex = indices[first + uint(i)], from = objects[object].first_tangent + 4u * vertex;
+            uint from_normal = objects[object].first_normal + 3u * vertex;
+            vec3 along = vec3(attributes[from], attributes[from + 1u], attributes[from + 2u]) * weights[i];
+            vec3 normal = vec3(attributes[from_normal], attributes[from_normal + 1u], attributes[from_normal + 2u]);
+            along_u += along;
+            along_v -= cross(normal, along) * attributes[from + 3u];
+        }
+    } else {
+        vec2 texcoords[3];
+        for (int i = 0; i < 3; ++i) {
+            uint vertex = indices[first + uint(i)], from = objects[object].first_texcoord + 2u * vertex;
+            texcoords[i] = number == NONE ? vec2(attributes[from], attributes[from + 1u])
+                                          : texcoord_of(object, vertex, number);
+        }
+        vec3 edge_1 = -primitives[hit.primitive].edge_1, edge_2 = primitives[hit.primitive].edge_2;
+        vec2 delta_1 = texcoords[1] - texcoords[0], delta_2 = texcoords[2] - texcoords[0];
+        along_u = tangent_along_u(edge_1, edge_2, delta_1.x, delta_2.x, delta_1.y, delta_2.y);
+        along_v = tangent_along_v(edge_1, edge_2, delta_1.x, delta_2.x, delta_1.y, delta_2.y);
     }
-    return perturbed_normal(normal, facet, along_u, along_v, texel_at_hit(hit, number).rgb, scale);
+    if ((objects[object].flags & HAS_TRANSFORM) != 0u) {
+        along_u = objects[object].transform * along_u;
+        along_v = objects[object].transform * along_v;
+    }
+}
+
+// Returns `normal`, perturbed by a normal texture. `facet` is the geometric normal. `number`: of the texture; `scale`: of
+// the perturbation; `footprint`: as in Surface.
+vec3 normal_mapped(Hit hit, uint number, float scale, vec3 facet, vec3 normal, float footprint) {
+    vec3 along_u, along_v;
+    tangents_of(hit, number, along_u, along_v);
+    return perturbed_normal(normal, facet, along_u, along_v, texel_at_hit(hit, number, footprint).rgb, scale);
+}
+
+// See Surface.footprint. `distance`: from the eye, mm; `facing`: cosine of the angle between the ray and the normal.
+float footprint_of(Hit hit, float distance, float facing) {
+    if (!has_textures || objects[hit.object].first_texcoord == NONE || !(frame.ray_angle > 0.0))
+        return 0.0;
+    vec3 edge_1 = primitives[hit.primitive].edge_1, edge_2 = primitives[hit.primitive].edge_2;
+    if ((objects[hit.object].flags & HAS_TRANSFORM) != 0u) {
+        edge_1 = objects[hit.object].transform * edge_1;
+        edge_2 = objects[hit.object].transform * edge_2;
+    }
+    float width = distance * frame.ray_angle;
+    return width * width / max(length(cross(edge_1, edge_2)) * max(abs(facing), 0.01), 1e-30);
 }
 
 // Returns the surface at a hit, without material properties. `normal_maps`: whether to apply normal textures.
@@ -105,6 +187,7 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
         normal = objects[object].normal_transform * normal;
     }
     vec3 vertex_normal = normal, coat_normal = normal;
+    float footprint = footprint_of(hit, length(path), dot(normalize_or(geometric, -path), normalize(path)));
     if (has_textures && normal_maps && materials[material].model == METALLIC_ROUGHNESS &&
         objects[object].first_texcoord != NONE)
         for (int i = 0; i < (has_coat ? 2 : 1); ++i) { // a loop rather than two calls, as in add_material()
@@ -114,7 +197,7 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
             vec3 mapped = normal_mapped(hit, number,
                                         i == 0 ? materials[material].normal_scale
                                                : materials[material].clearcoat_normal_scale,
-                                        geometric, vertex_normal);
+                                        geometric, vertex_normal, footprint);
             if (i == 0)
                 normal = mapped;
             else
@@ -122,6 +205,7 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
         }
 
     Surface s;
+    s.footprint = footprint;
     s.position = ray.origin + path;
     s.distance = length(path);
     s.is_real = objects[object].role != VIRTUAL;
@@ -143,9 +227,18 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
     s.exponent = s.alpha = s.transmission = s.coat = 0.0;
     s.edge_reflectance = s.opacity = s.coat_alpha = s.dielectric_edge = 1.0;
     s.dielectric = vec3(0.0);
-    s.transmitted = vec3(0.0);
+    s.transmitted = s.sheen = s.tangent = s.bitangent = vec3(0.0);
+    s.sheen_roughness = s.tangent_alpha = 1.0;
     s.is_rough = false;
     return s;
+}
+
+// Returns the reflectance at normal incidence of a surface under a thin film that gives Schlick's term the reflectance of
+// the film at the angle of the eye. All microfacets have it. `f0`, `f90`: without the film.
+vec3 under_film(vec3 f0, float f90, float index, float thickness_nm, float cosine) {
+    vec3 seen = film_reflectance(f0, index, thickness_nm, cosine);
+    return vec3(schlick_inverse(seen.x, f90, cosine), schlick_inverse(seen.y, f90, cosine),
+                schlick_inverse(seen.z, f90, cosine));
 }
 
 // Sets the material properties of a surface that is neither a mirror nor glass. `to_eye`: unit vector.
@@ -163,19 +256,28 @@ void add_material(inout Surface s, Hit hit, vec3 to_eye) {
     float transmission = materials[material].transmission;
     float coat = materials[material].clearcoat, coat_roughness = materials[material].clearcoat_roughness;
     float occlusion = 1.0;
+    vec3 sheen = materials[material].sheen;
+    float sheen_roughness = materials[material].sheen_roughness;
+    vec3 anisotropy = vec3(1.0, 0.0, materials[material].anisotropy); // direction and strength
+    float film = materials[material].iridescence, film_nm = materials[material].iridescence_thickness_nm.y;
     if (has_textures) {
         bool is_emissive = s.emission.x + s.emission.y + s.emission.z > 0.0;
         // A loop rather than calls, because texture sampling is inlined and its code is long.
-        uint numbers[9] = uint[](materials[material].colour_texture, materials[material].metallic_roughness_texture,
+        uint numbers[14] = uint[](materials[material].colour_texture, materials[material].metallic_roughness_texture,
                                  is_emissive ? materials[material].emission_texture : NONE,
                                  materials[material].specular_texture, materials[material].specular_colour_texture,
                                  materials[material].transmission_texture, materials[material].clearcoat_texture,
                                  materials[material].clearcoat_roughness_texture,
-                                 materials[material].occlusion_texture);
-        for (int i = 0; i < 9; ++i) {
+                                 materials[material].occlusion_texture,
+                                 has_sheen ? materials[material].sheen_texture : NONE,
+                                 has_sheen ? materials[material].sheen_roughness_texture : NONE,
+                                 is_anisotropic ? materials[material].anisotropy_texture : NONE,
+                                 has_film ? materials[material].iridescence_texture : NONE,
+                                 has_film ? materials[material].iridescence_thickness_texture : NONE);
+        for (int i = 0; i < 14; ++i) {
             if (numbers[i] == NONE || (!is_rough && i != 0 && i != 2))
                 continue;
-            vec4 texel = texel_at_hit(hit, numbers[i]);
+            vec4 texel = texel_at_hit(hit, numbers[i], s.footprint);
             if (i == 0) {
                 colour *= texel;
             } else if (i == 1) {
@@ -193,8 +295,18 @@ void add_material(inout Surface s, Hit hit, vec3 to_eye) {
                 coat *= texel.x;
             } else if (i == 7) {
                 coat_roughness *= texel.y;
-            } else {
+            } else if (i == 8) {
                 occlusion = 1.0 + (texel.x - 1.0) * materials[material].occlusion_strength;
+            } else if (i == 9) {
+                sheen *= texel.rgb;
+            } else if (i == 10) {
+                sheen_roughness *= texel.a;
+            } else if (i == 11) {
+                anisotropy = vec3(texel.xy * 2.0 - 1.0, anisotropy.z * texel.z);
+            } else if (i == 12) {
+                film *= texel.x;
+            } else {
+                film_nm = mix(materials[material].iridescence_thickness_nm.x, film_nm, texel.y);
             }
         }
     }
@@ -228,6 +340,28 @@ void add_material(inout Surface s, Hit hit, vec3 to_eye) {
             s.coat = coat;
             s.coat_alpha = ggx_alpha(coat_roughness);
             s.emission *= below_coat(s, to_eye);
+        }
+        s.sheen = sheen;
+        s.sheen_roughness = sheen_roughness_of(sheen_roughness);
+        if (is_anisotropic) {
+            s.tangent = vec3(0.0);
+            s.tangent_alpha = s.alpha;
+            if (objects[hit.object].first_texcoord != NONE || objects[hit.object].first_tangent != NONE) {
+                vec3 along_u, along_v;
+                tangents_of(hit, materials[material].anisotropy_texture, along_u, along_v);
+                vec2 turn = materials[material].anisotropy_direction;
+                // The second axis of the texture is along −v.
+                s.tangent = normalize_or(along_u, vec3(0.0)) * (anisotropy.x * turn.x - anisotropy.y * turn.y) -
+                            normalize_or(along_v, vec3(0.0)) * (anisotropy.x * turn.y + anisotropy.y * turn.x);
+                s.tangent_alpha = mix(s.alpha, 1.0, anisotropy.z * anisotropy.z);
+            }
+            s.tangent = tangent_of(s.normal, s.tangent, tangent_axis(s.normal));
+            s.bitangent = cross(s.normal, s.tangent);
+        }
+        if (has_film && film > 0.0) {
+            float index = materials[material].iridescence_index, cosine = dot(s.normal, to_eye);
+            s.specular = mix(s.specular, under_film(s.specular, s.edge_reflectance, index, film_nm, cosine), film);
+            s.dielectric = mix(s.dielectric, under_film(s.dielectric, s.dielectric_edge, index, film_nm, cosine), film);
         }
     }
 }

@@ -13,9 +13,9 @@ int wrapped(int i, int size, uint wrap) {
     return wrap == WRAP_MIRROR && within >= size ? period - 1 - within : within;
 }
 
-// Returns a texel's linear colour and alpha.
-vec4 texel_at(uint number, int x, int y) {
-    uint at = uint(y * textures[number].width + x), first = textures[number].first_texel;
+// Returns a texel's linear colour and alpha. `at`: its index in the image.
+vec4 texel_at(uint number, uint at) {
+    uint first = textures[number].first_texel;
     if (textures[number].format == TEXEL_RGBA32F) {
         first += 4u * at;
         return uintBitsToFloat(uvec4(texels[first], texels[first + 1u], texels[first + 2u], texels[first + 3u]));
@@ -37,18 +37,38 @@ float reduced(float t, uint wrap) {
     return bounded - 2.0 * floor(bounded * 0.5);
 }
 
-// Samples a texture with its filter.
-vec4 sample_texture(uint number, vec2 texcoord) {
-    uint wrap_u = textures[number].wrap_u, wrap_v = textures[number].wrap_v;
+// Samples a level of a texture.
+vec4 sample_level(uint number, int level, vec2 texcoord) {
+    uint wrap_u = textures[number].wrap_u, wrap_v = textures[number].wrap_v, first = 0u;
     int width = textures[number].width, height = textures[number].height;
+    for (int i = 0; i < level; ++i) {
+        first += uint(width * height);
+        width = max(width >> 1, 1);
+        height = max(height >> 1, 1);
+    }
     vec2 at = vec2(reduced(texcoord.x, wrap_u), reduced(texcoord.y, wrap_v)) * vec2(width, height);
     bool is_nearest = textures[number].is_nearest != 0u;
     at -= is_nearest ? 0.0 : 0.5;
     vec2 corner = floor(at), weights = is_nearest ? vec2(0.0) : at - corner;
     int x0 = wrapped(int(corner.x), width, wrap_u), x1 = wrapped(int(corner.x) + 1, width, wrap_u);
     int y0 = wrapped(int(corner.y), height, wrap_v), y1 = wrapped(int(corner.y) + 1, height, wrap_v);
-    vec4 a = texel_at(number, x0, y0), b = texel_at(number, x1, y0);
-    vec4 c = texel_at(number, x0, y1), d = texel_at(number, x1, y1);
+    vec4 a = texel_at(number, first + uint(y0 * width + x0)), b = texel_at(number, first + uint(y0 * width + x1));
+    vec4 c = texel_at(number, first + uint(y1 * width + x0)), d = texel_at(number, first + uint(y1 * width + x1));
     vec4 top = a + (b - a) * weights.x, bottom = c + (d - c) * weights.x;
     return top + (bottom - top) * weights.y;
+}
+
+// Samples a texture with its filter. `area`: that a sample covers, in the unit of u times that of v; 0: the largest
+// level.
+vec4 sample_texture(uint number, vec2 texcoord, float area) {
+    float texels = area * float(textures[number].width) * float(textures[number].height);
+    float level = min(0.5 * log2(clamp(texels, 1.0, 1e30)), float(textures[number].level_count - 1u));
+    float lower = floor(level), weight = level - lower;
+    vec4 sum = vec4(0.0);
+    // A loop rather than two calls, because the code is long.
+    for (int i = 0; i < (weight > 0.0 ? 2 : 1); ++i) {
+        vec4 texel = sample_level(number, int(lower) + i, texcoord);
+        sum = i == 0 ? texel : sum + (texel - sum) * weight;
+    }
+    return sum;
 }

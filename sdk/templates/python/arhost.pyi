@@ -243,6 +243,7 @@ class Geometry:
     positions: Buffer
     normals: Buffer
     texcoords: Buffer
+    tangents: Buffer
     colours: Buffer
     indices: Buffer
     joints: Buffer
@@ -258,6 +259,8 @@ class TexelImage:
     width: int
     height: int
     name: int
+    level_count: int
+    reserved: int
     texels: Buffer
 WRAP_REPEAT: int
 WRAP_CLAMP: int
@@ -312,6 +315,18 @@ class Material:
     clearcoat_roughness_texture: int
     clearcoat_normal_texture: int
     clearcoat_normal_scale: float
+    sheen: np.ndarray
+    sheen_roughness: float
+    sheen_texture: int
+    sheen_roughness_texture: int
+    anisotropy: float
+    anisotropy_direction: np.ndarray
+    anisotropy_texture: int
+    iridescence: float
+    iridescence_index: float
+    iridescence_thickness_nm: np.ndarray
+    iridescence_texture: int
+    iridescence_thickness_texture: int
     index: float
     fresnel_exponent: float
     fresnel_minimum: float

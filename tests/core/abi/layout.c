@@ -270,7 +270,7 @@ STRUCT(arhost_tracker, 48,
 
 /* arhost/scene.h */
 VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);
-VALUE(ARHOST_SCENE_VERSION, 5);
+VALUE(ARHOST_SCENE_VERSION, 6);
 VALUE(ARHOST_NONE, 0xffffffff);
 
 STRUCT(arhost_buffer, 16,
@@ -280,16 +280,17 @@ VALUE(ARHOST_AXES_Y_UP, 2);
 VALUE(ARHOST_GEOMETRY_TRIANGLES, 1);
 VALUE(ARHOST_GEOMETRY_SPHERES, 2);
 
-STRUCT(arhost_geometry, 152,
+STRUCT(arhost_geometry, 168,
        FIELD(type, 0, 4) FIELD(reserved, 4, 4) FIELD(positions, 8, 16) FIELD(normals, 24, 16)
-       FIELD(texcoords, 40, 16) FIELD(colours, 56, 16) FIELD(indices, 72, 16) FIELD(joints, 88, 16)
-       FIELD(weights, 104, 16) FIELD(morph_positions, 120, 16) FIELD(morph_normals, 136, 16))
+       FIELD(texcoords, 40, 16) FIELD(tangents, 56, 16) FIELD(colours, 72, 16) FIELD(indices, 88, 16)
+       FIELD(joints, 104, 16) FIELD(weights, 120, 16) FIELD(morph_positions, 136, 16) FIELD(morph_normals, 152, 16))
 VALUE(ARHOST_TEXEL_SRGB8, 1);
 VALUE(ARHOST_TEXEL_RGBA8, 2);
 VALUE(ARHOST_TEXEL_RGBA32F, 3);
 
-STRUCT(arhost_texel_image, 32,
-       FIELD(format, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(name, 12, 4) FIELD(texels, 16, 16))
+STRUCT(arhost_texel_image, 40,
+       FIELD(format, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(name, 12, 4) FIELD(level_count, 16, 4)
+       FIELD(reserved, 20, 4) FIELD(texels, 24, 16))
 VALUE(ARHOST_WRAP_REPEAT, 1);
 VALUE(ARHOST_WRAP_CLAMP, 2);
 VALUE(ARHOST_WRAP_MIRROR, 3);
@@ -307,7 +308,7 @@ VALUE(ARHOST_MATERIAL_GLASS, 5);
 VALUE(ARHOST_MATERIAL_METALLIC_ROUGHNESS, 6);
 VALUE(ARHOST_MATERIAL_UNLIT, 7);
 
-STRUCT(arhost_material, 240,
+STRUCT(arhost_material, 304,
        FIELD(model, 0, 4) FIELD(colour_texture, 4, 4) FIELD(ambient, 8, 12) FIELD(diffuse, 20, 12)
        FIELD(specular, 32, 12) FIELD(exponent, 44, 4) FIELD(reflectivity, 48, 12) FIELD(emission, 60, 12)
        FIELD(opacity, 72, 4) FIELD(alpha_cutoff, 76, 4) FIELD(blends, 80, 4) FIELD(metallic, 84, 4)
@@ -317,11 +318,15 @@ STRUCT(arhost_material, 240,
        FIELD(specular_colour_texture, 124, 4) FIELD(transmission, 128, 4) FIELD(transmission_texture, 132, 4)
        FIELD(thin_walled, 136, 4) FIELD(clearcoat, 140, 4) FIELD(clearcoat_roughness, 144, 4)
        FIELD(clearcoat_texture, 148, 4) FIELD(clearcoat_roughness_texture, 152, 4)
-       FIELD(clearcoat_normal_texture, 156, 4) FIELD(clearcoat_normal_scale, 160, 4) FIELD(index, 164, 4)
-       FIELD(fresnel_exponent, 168, 4) FIELD(fresnel_minimum, 172, 4) FIELD(fresnel_maximum, 176, 4)
-       FIELD(refraction, 180, 12) FIELD(extinction, 192, 12) FIELD(shadow_attenuation, 204, 12)
-       FIELD(cutoff_colour, 216, 12) FIELD(importance_cutoff, 228, 4) FIELD(reflection_depth, 232, 4)
-       FIELD(refraction_depth, 236, 4))
+       FIELD(clearcoat_normal_texture, 156, 4) FIELD(clearcoat_normal_scale, 160, 4) FIELD(sheen, 164, 12)
+       FIELD(sheen_roughness, 176, 4) FIELD(sheen_texture, 180, 4) FIELD(sheen_roughness_texture, 184, 4)
+       FIELD(anisotropy, 188, 4) FIELD(anisotropy_direction, 192, 8) FIELD(anisotropy_texture, 200, 4)
+       FIELD(iridescence, 204, 4) FIELD(iridescence_index, 208, 4) FIELD(iridescence_thickness_nm, 212, 8)
+       FIELD(iridescence_texture, 220, 4) FIELD(iridescence_thickness_texture, 224, 4) FIELD(index, 228, 4)
+       FIELD(fresnel_exponent, 232, 4) FIELD(fresnel_minimum, 236, 4) FIELD(fresnel_maximum, 240, 4)
+       FIELD(refraction, 244, 12) FIELD(extinction, 256, 12) FIELD(shadow_attenuation, 268, 12)
+       FIELD(cutoff_colour, 280, 12) FIELD(importance_cutoff, 292, 4) FIELD(reflection_depth, 296, 4)
+       FIELD(refraction_depth, 300, 4))
 VALUE(ARHOST_ROLE_VIRTUAL, 1);
 VALUE(ARHOST_ROLE_CATCHER, 2);
 VALUE(ARHOST_ROLE_OCCLUDER, 3);

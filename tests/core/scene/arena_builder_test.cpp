@@ -188,7 +188,7 @@ TEST_P(Rejects, Field) {
 
 const Corruption faults_of_small_scene[] = {
     {"Magic", [](Parts a) { a.scene.magic ^= 1; }, "magic number"},
-    {"Version", [](Parts a) { a.scene.version = 1; }, "version is 1, not 5"},
+    {"Version", [](Parts a) { a.scene.version = 1; }, "version is 1, not 6"},
     {"StructSize", [](Parts a) { a.scene.struct_size += 8; }, "the struct_size of its header is wrong"},
     {"ByteSizeTooLarge", [](Parts a) { a.scene.byte_size += 64; }, "bytes, but"},
     {"ByteSizeHuge", [](Parts a) { a.scene.byte_size = ~0ull; }, "bytes, but"},
@@ -305,7 +305,7 @@ const Corruption faults_of_geometry[] = {
      [](Parts a) {
          a.geometries[1].indices = arhost_buffer{0, 0, 12};
      },
-     "spheres cannot have normals, texcoords, colours, indices"},
+     "spheres cannot have normals, texcoords, tangents, colours, indices"},
     {"PositionsOverHeader", [](Parts a) { a.geometries[0].positions.offset = 0; }, "overlaps the header"},
     {"NoSpheres", [](Parts a) { a.geometries[1].positions = {}; }, "it has no spheres"},
 };

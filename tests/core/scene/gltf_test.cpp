@@ -416,6 +416,97 @@ TEST(Gltf, ReadsMaterialExtensions) {
     EXPECT_EQ(coated.clearcoat, 0.75f);
     EXPECT_EQ(coated.clearcoat_roughness, 0.5f);
     EXPECT_EQ(coated.clearcoat_normal_scale, 2);
+    const arhost_material cloth =
+        extension("KHR_materials_sheen", R"({"sheenColorFactor": [0.5, 1, 0], "sheenColorTexture": {"index": 0},
+            "sheenRoughnessFactor": 0.25, "sheenRoughnessTexture": {"index": 0}})");
+    EXPECT_THAT(cloth.sheen, ElementsAre(0.5f, 1, 0));
+    EXPECT_EQ(cloth.sheen_roughness, 0.25f);
+    EXPECT_EQ(cloth.sheen_texture, cloth.sheen_roughness_texture) << "one image";
+    const arhost_material brushed =
+        extension("KHR_materials_anisotropy", R"({"anisotropyStrength": 0.5, "anisotropyRotation": 1.5707964})");
+    EXPECT_EQ(brushed.anisotropy, 0.5f);
+    EXPECT_NEAR(brushed.anisotropy_direction[0], 0, 1e-6);
+    EXPECT_NEAR(brushed.anisotropy_direction[1], 1, 1e-6);
+    const arhost_material film =
+        extension("KHR_materials_iridescence", R"({"iridescenceFactor": 0.5, "iridescenceThicknessMaximum": 800})");
+    EXPECT_EQ(film.iridescence, 0.5f);
+    EXPECT_EQ(film.iridescence_index, 1.3f);
+    EXPECT_THAT(film.iridescence_thickness_nm, ElementsAre(100, 800));
+}
+
+TEST(Gltf, GivesNormalMapsTangents) {
+    const auto tangents = [](const std::string &attributes, const std::string &texture) {
+        Gltf gltf = triangle();
+        const int view = gltf.view(png(1, 1, 4, {1, 2, 3, 4}));
+        gltf.floats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3", 3);             // accessor 2
+        gltf.floats({0, 2, 0, -1, 0, 2, 0, -1, 0, 2, 0, -1}, "VEC4", 4); // accessor 3
+        gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1)" + attributes +
+                      R"(}, "material": 0}]})";
+        gltf.more = R"(, "materials": [{"normalTexture": {"index": 0)" + texture +
+                    R"(}}], "textures": [{"source": 0}], "images": [{"mimeType": "image/png", "bufferView": )" +
+                    std::to_string(view) + "}]";
+        const Arena arena = load(gltf.text()).arena;
+        const arhost_buffer &buffer = geometry(arena).tangents;
+        const auto *first = reinterpret_cast<const glm::vec4 *>(arena.bytes().data() + buffer.offset);
+        return std::vector<glm::vec4>(first, first + buffer.count);
+    };
+    const std::string normals = R"(, "NORMAL": 2)";
+    EXPECT_EQ(tangents(normals, ""), std::vector<glm::vec4>(3, {1, 0, 0, -1}));
+    EXPECT_EQ(tangents(normals + R"(, "TANGENT": 3)", ""), std::vector<glm::vec4>(3, {0, 1, 0, -1})) << "the file's";
+    EXPECT_TRUE(tangents("", "").empty()) << "flat shading";
+    EXPECT_TRUE(tangents(normals, R"(, "extensions": {"KHR_texture_transform": {"rotation": 1}})").empty());
+}
+
+TEST(Gltf, ReadsLights) {
+    const auto with = [](const std::string &light, const std::string &node = "") {
+        Gltf gltf = triangle();
+        gltf.nodes =
+            R"({"mesh": 0}, {"translation": [1, 2, 3], "extensions": {"KHR_lights_punctual": {"light": 0}})" + node +
+            "}";
+        gltf.scene_nodes = "0, 1";
+        gltf.more = R"(, "extensions": {"KHR_lights_punctual": {"lights": [)" + light + "]}}";
+        return gltf.text();
+    };
+    const auto scene_of = [](const std::string &gltf, const std::string &keys, const char *version = "2") {
+        const ScratchFolder folder;
+        write_file(folder.path() / "a.gltf", gltf);
+        write_file(folder.path() / "s.yaml", std::string("version: ") + version +
+                                                 "\naxes: y-up\nmaterials: {}\nobjects: [{gltf: a.gltf" + keys +
+                                                 "}]\n");
+        return build(load_scene(folder.path() / "s.yaml"));
+    };
+    const auto light_of = [&](const std::string &light, const std::string &node = "") {
+        const Arena arena = scene_of(with(light, node), ", unit: m");
+        EXPECT_EQ(arena.scene().lights.count, 1u);
+        return *reinterpret_cast<const arhost_light *>(arena.bytes().data() + arena.scene().lights.offset);
+    };
+    // 3 cd at a distance of 2 m: 3/4 lx, a radiance of 3/4 / π of white surfaces.
+    const arhost_light point = light_of(R"({"type": "point", "intensity": 3, "color": [1, 0.5, 0]})");
+    EXPECT_EQ(point.type, ARHOST_LIGHT_POINT);
+    EXPECT_THAT(point.position, ElementsAre(1000, 2000, 3000));
+    EXPECT_NEAR(point.intensity[0] / (2000.0 * 2000.0), 0.75 / std::numbers::pi, 1e-6);
+    EXPECT_NEAR(point.intensity[1] / point.intensity[0], 0.5, 1e-6);
+    const arhost_light sun =
+        light_of(R"({"type": "directional", "intensity": 2})", R"(, "rotation": [0, 0.70710678, 0, 0.70710678])");
+    EXPECT_THAT(sun.direction, ElementsAre(FloatNear(-1, 1e-6f), FloatNear(0, 1e-6f), FloatNear(0, 1e-6f)));
+    EXPECT_NEAR(sun.intensity[0], 2 / std::numbers::pi, 1e-6);
+    const arhost_light spot = light_of(R"({"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.2}})");
+    EXPECT_NEAR(spot.cosine_inner, std::cos(0.1), 1e-6);
+    EXPECT_NEAR(spot.cosine_outer, std::cos(0.2), 1e-6);
+
+    const std::string any = with(R"({"type": "point"})");
+    EXPECT_EQ(scene_of(any, ", lights: false").scene().lights.count, 0u);
+    EXPECT_EQ(scene_of(any, "", "1").scene().lights.count, 0u) << "integrator: whitted";
+    EXPECT_EQ(scene_of(any, ", on: cube").scene().lights.count, 0u) << "moves";
+    const auto error_of = [&](const std::string &gltf) {
+        return arhost::test::error_of([&] { scene_of(gltf, ""); });
+    };
+    EXPECT_THAT(error_of(with(R"({"type": "lamp"})")),
+                HasSubstr("lights[0].type: must be point, spot or directional"));
+    EXPECT_THAT(error_of(with("")),
+                HasSubstr("nodes[1].extensions.KHR_lights_punctual.light: the file has only 0 lights"));
+    EXPECT_THAT(error_of(with(R"({"type": "spot", "spot": {"innerConeAngle": 1}})")),
+                HasSubstr("innerConeAngle: must be less than outerConeAngle"));
 }
 
 TEST(Gltf, ReadsThinWallsAndVolumes) {

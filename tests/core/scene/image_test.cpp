@@ -43,13 +43,14 @@ private:
     ScratchFolder folder_;
 };
 
+// Return the texels of the largest level.
 std::vector<int> bytes(const Arena &a, std::size_t i = 0) {
     const auto *p = elements<std::uint8_t>(a, image(a, i).texels);
-    return {p, p + 4 * image(a, i).texels.count};
+    return {p, p + 4 * texel_count(image(a, i).width, image(a, i).height, 1)};
 }
 std::vector<float> floats(const Arena &a, std::size_t i = 0) {
     const auto *p = elements<float>(a, image(a, i).texels);
-    return {p, p + 4 * image(a, i).texels.count};
+    return {p, p + 4 * texel_count(image(a, i).width, image(a, i).height, 1)};
 }
 
 } // namespace
@@ -62,6 +63,7 @@ TEST(Textures, PngsHaveTheTopRowFirstAndStraightAlpha) {
     EXPECT_EQ(image(arena).height, 2u);
     EXPECT_EQ(texture(arena).wrap_u, ARHOST_WRAP_REPEAT);
     EXPECT_THAT(bytes(arena), ElementsAre(10, 20, 30, 40, 50, 60, 70, 80));
+    EXPECT_EQ(image(arena).level_count, 2u);
     EXPECT_EQ(material(arena).colour_texture, 0u);
     EXPECT_THAT(material(arena).diffuse, testing::Each(1.0f)) << "default with a texture";
 }

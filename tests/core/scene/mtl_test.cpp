@@ -68,9 +68,11 @@ const Texture &lookup(const ArenaBuilder &builder, std::uint32_t texture) {
     return builder.texture(texture);
 }
 
+// Returns the texels of the largest level.
 std::vector<int> bytes(const ArenaBuilder &builder, std::uint32_t texture) {
     std::vector<int> values;
-    for (const std::byte value : builder.image_of_texture(texture).texels.span())
+    const TexelImage &image = builder.image_of_texture(texture);
+    for (const std::byte value : image.texels.span().first(4 * texel_count(image.width, image.height, 1)))
         values.push_back(std::to_integer<int>(value));
     return values;
 }

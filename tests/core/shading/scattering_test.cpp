@@ -159,7 +159,7 @@ TEST(Ggx, VisibleNormalsAreSampledByTheirDensity) {
             const Vec3 eye = direction(theta, 2.0);
             std::array<double, cells * cells> chosen{};
             mean_over_square([&](double u, double v) {
-                const Vec3 n = ggx_visible_normal(eye, alpha, u, v);
+                const Vec3 n = ggx_visible_normal(eye, alpha, alpha, u, v);
                 EXPECT_NEAR(dot(n, n), 1, 1e-12);
                 const double t = std::acos(n.z) / (pi / 2), p = std::atan2(n.y, n.x) / (2 * pi) + 0.5;
                 const int row = std::min(static_cast<int>(t * cells), cells - 1);
@@ -215,8 +215,82 @@ TEST(Ggx, HalfVectorsRotateWithTheSurface) {
     const Vec3 normal = normalize({0.3, -0.5, -0.7}), x = tangent_axis(normal), y = bitangent_axis(normal);
     const Vec3 eye = direction(0.6, 1);
     const Vec3 turned_eye = x * eye.x + y * eye.y + normal * eye.z;
-    const Vec3 n = ggx_visible_normal(eye, 0.4, 0.3, 0.8);
+    const Vec3 n = ggx_visible_normal(eye, 0.4, 0.4, 0.3, 0.8);
     expect_near(ggx_half_vector(normal, turned_eye, 0.4, 0.3, 0.8), x * n.x + y * n.y + normal * n.z, 1e-14);
+}
+
+TEST(AnisotropicGgx, EqualsGgxIfBothAlphasAreEqual) {
+    const Vec3 eye = direction(0.9, 0.4), light = direction(0.5, 2), half = normalize(eye + light);
+    EXPECT_NEAR(anisotropic_lobe(light, eye, half, 0.3, 0.3), ggx_lobe(light.z, eye.z, half.z, 0.3), 1e-12);
+    EXPECT_NEAR(anisotropic_reflection_density(eye, half, 0.3, 0.3), ggx_reflection_density(eye.z, half.z, 0.3),
+                1e-12);
+}
+
+TEST(AnisotropicGgx, LampsAndSampledRaysReflectTheSameLight) {
+    const Vec3 x{1, 0, 0}, y{0, 1, 0};
+    for (const auto &[alpha_x, alpha_y] : {std::pair(0.7, 0.2), std::pair(0.2, 1.0)})
+        for (const double theta : {0.2, 0.9, 1.3}) {
+            const Vec3 eye = direction(theta, 0.7);
+            const double by_lamps = integral_over_hemisphere([&](Vec3 light) {
+                return anisotropic_lobe(light, eye, normalize(eye + light), alpha_x, alpha_y) / pi;
+            });
+            const double by_rays = mean_over_square([&](double u, double v) {
+                const Vec3 half = anisotropic_half_vector(x, y, up, eye, alpha_x, alpha_y, u, v),
+                           light = mirror_direction(-eye, half);
+                return light.z > 0 ? anisotropic_lobe(light, eye, half, alpha_x, alpha_y) / pi /
+                                         anisotropic_reflection_density(eye, half, alpha_x, alpha_y)
+                                   : 0;
+            });
+            EXPECT_NEAR(by_rays, by_lamps, 3e-3) << alpha_x << " " << theta;
+            EXPECT_LE(by_lamps, 1.001) << alpha_x << " " << theta;
+        }
+}
+
+TEST(Sheen, AlbedoIsTheIntegralOfTheLobe) {
+    for (const double roughness : {0.2, 0.35, 0.6, 1.0})
+        for (const double theta : {0.0, 0.6, 1.0, 1.3, 1.5}) {
+            const Vec3 eye = direction(theta, 0);
+            EXPECT_NEAR(sheen_albedo(eye.z, roughness), integral_over_hemisphere([&](Vec3 light) {
+                            return sheen_lobe(light.z, eye.z, normalize(eye + light).z, roughness * roughness) / pi;
+                        }),
+                        0.011)
+                << roughness << " " << theta;
+        }
+    EXPECT_EQ(sheen_roughness_of(0.1), 0.2);
+}
+
+TEST(ThinFilm, OfNoThicknessHasNoEffect) {
+    const Vec3 f0{0.04, 0.3, 0.9};
+    expect_near(film_reflectance(f0, 1.8, 0, 0.4), schlick(f0, 0.4), 2e-3);
+    EXPECT_NEAR(schlick_inverse(schlick(f0, 0.4).y, 1, 0.4), 0.3, 1e-12);
+}
+
+// Integrates Airy's formula for normal incidence over the spectrum, with approximations of the CIE 1931 colour
+// matching functions (C. Wyman et al., Simple Analytic Approximations to the CIE XYZ Color Matching Functions, JCGT
+// 2(2), 2013).
+TEST(ThinFilm, HasTheColoursOfInterference) {
+    const auto lobe = [](double x, double mean, double below, double above) {
+        const double t = (x - mean) / (x < mean ? below : above);
+        return std::exp(-t * t / 2);
+    };
+    for (const double nm : {150.0, 280.0, 400.0, 650.0}) {
+        const double film = 1.8, base = 1.5;
+        const double r1 = (1 - film) / (1 + film), r2 = (film - base) / (film + base);
+        Vec3 xyz{0, 0, 0}, white{0, 0, 0};
+        for (double wave = 380; wave <= 780; wave += 1) {
+            const double turn = std::cos(4 * pi * film * nm / wave);
+            const double reflected =
+                (r1 * r1 + r2 * r2 + 2 * r1 * r2 * turn) / (1 + r1 * r1 * r2 * r2 + 2 * r1 * r2 * turn);
+            const Vec3 observer{1.056 * lobe(wave, 599.8, 37.9, 31) + 0.362 * lobe(wave, 442, 16, 26.7) -
+                                    0.065 * lobe(wave, 501.1, 20.4, 26.2),
+                                0.821 * lobe(wave, 568.8, 46.9, 40.5) + 0.286 * lobe(wave, 530.9, 16.3, 31.1),
+                                1.217 * lobe(wave, 437, 11.8, 36) + 0.681 * lobe(wave, 459, 26, 13.8)};
+            xyz = xyz + observer * reflected;
+            white = white + observer;
+        }
+        const double luminance_of_film = luminance(film_reflectance({0.04, 0.04, 0.04}, film, nm, 1));
+        EXPECT_NEAR(luminance_of_film, xyz.y / white.y, 0.02) << nm;
+    }
 }
 
 TEST(DielectricReflectance, IsFresnels) {

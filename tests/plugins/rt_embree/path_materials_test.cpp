@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Materials of the path integrator: opacity, vertex colours, several sets of texture coordinates, transmission, clear
-// coats, unlit surfaces and hidden back faces.
+// Materials of the path integrator: opacity, vertex colours, texture coordinates and filtering, tangents,
+// transmission, clear coats, sheen, anisotropy, iridescence, unlit surfaces and hidden back faces.
 #include "linear_tracer.hpp"
 #include "rich_scene.hpp"
+#include "scene/image_levels.hpp"
+
+#include <arhost/shading/scalar.hpp>
 
 #include <array>
 #include <cmath>
@@ -212,6 +215,130 @@ TEST(PathMaterials, ClearCoatsInAFurnaceKeepEnergy) {
         const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "256"}});
         EXPECT_NEAR(mean_at(picture, 100, 75), 1, 0.01) << roughness;
     }
+}
+
+TEST(PathMaterials, SheenInAFurnaceKeepsEnergy) {
+    for (const float roughness : {0.3f, 0.8f}) {
+        SceneBuilder scene = in_a_furnace(1);
+        arhost_material cloth = metallic_roughness({1, 1, 1}, 0, 1);
+        cloth.specular_weight = 0; // Lambert
+        set3(cloth.sheen, 1, 1, 1);
+        cloth.sheen_roughness = roughness;
+        scene.add_ball("ball", {0, 0, 0, 40}, cloth);
+        const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "256"}});
+        EXPECT_NEAR(mean_at(picture, 100, 75), 1, 0.01) << roughness;
+        EXPECT_NEAR(mean_at(picture, 112, 84), 1, 0.01) << roughness;
+    }
+}
+
+TEST(PathMaterials, SheenShowsAtGrazingAngles) {
+    SceneBuilder scene = in_a_furnace(1);
+    arhost_material cloth = metallic_roughness({0, 0, 0}, 0, 1);
+    cloth.specular_weight = 0;
+    set3(cloth.sheen, 1, 0, 0);
+    cloth.sheen_roughness = 0.4f;
+    scene.add_ball("ball", {0, 0, 0, 40}, cloth);
+    const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "64"}});
+    double brightest = 0;
+    for (std::uint32_t x = 104; x < 196; ++x)
+        brightest = std::max(brightest, mean_at(picture, x, 75));
+    EXPECT_LT(mean_at(picture, 100, 75), 0.05);
+    EXPECT_GT(brightest, 0.18);
+    EXPECT_EQ(mean_at(picture, 100, 75, 1), 0);
+}
+
+// A lamp straight above a brushed square: its highlight is long in the direction of the anisotropy.
+TEST(PathMaterials, AnisotropyStretchesHighlights) {
+    const auto render = [](glm::vec2 direction, bool has_texture) {
+        SceneBuilder scene = in_a_furnace(0);
+        arhost_material brushed = metallic_roughness({1, 1, 1}, 1, 0.3f);
+        brushed.anisotropy = 0.8f;
+        if (has_texture) // turns by a right angle, and leaves the strength as it is
+            brushed.anisotropy_texture = scene.add_texture("turn", [] {
+                scene::TexelImage image = texture_of(1, 1, {{128, 255, 255, 255}});
+                image.format = ARHOST_TEXEL_RGBA8;
+                return image;
+            }());
+        std::copy_n(&direction.x, 2, brushed.anisotropy_direction);
+        scene.add_mesh("square", textured_square(60, 0), brushed);
+        arhost_light lamp = scene::make_light(ARHOST_LIGHT_POINT);
+        lamp.position[2] = 60;
+        scene.add_light(lamp);
+        return rendered(std::move(scene));
+    };
+    const LinearPicture along_x = render({1, 0}, false), along_y = render({0, 1}, false),
+                        by_texture = render({1, 0}, true);
+    EXPECT_GT(mean_at(along_x, 135, 75), 2 * mean_at(along_x, 100, 40));
+    EXPECT_GT(mean_at(along_y, 100, 40), 2 * mean_at(along_y, 135, 75));
+    EXPECT_NEAR(mean_at(by_texture, 100, 40), mean_at(along_y, 100, 40), 0.02);
+}
+
+// A soap film in a white room, at two thicknesses that its texture chooses.
+TEST(PathMaterials, ThinFilmHasTheColoursOfInterference) {
+    SceneBuilder scene = in_a_furnace(1);
+    arhost_material film = metallic_roughness({0, 0, 0}, 0, 0);
+    film.iridescence = 1;
+    film.iridescence_index = 1.8f;
+    film.iridescence_thickness_nm[0] = 250;
+    film.iridescence_thickness_nm[1] = 450;
+    scene::TexelImage two = texture_of(2, 1, {{0, 0, 0, 255}, {0, 255, 0, 255}});
+    two.format = ARHOST_TEXEL_RGBA8;
+    film.iridescence_thickness_texture = scene.add_texture(
+        "two", std::move(two), {.wrap_u = ARHOST_WRAP_CLAMP, .filter = ARHOST_TEXEL_FILTER_NEAREST});
+    scene.add_mesh("square", textured_square(60, 0), film);
+    const LinearPicture picture = rendered(std::move(scene));
+    for (const auto &[x, nm] : {std::pair(95u, 250.0), std::pair(105u, 450.0)}) {
+        const auto expected = shading::film_reflectance({0.04, 0.04, 0.04}, 1.8, nm, 1);
+        EXPECT_NEAR(mean_at(picture, x, 75, 0), expected.x, 0.01) << nm;
+        EXPECT_NEAR(mean_at(picture, x, 75, 1), expected.y, 0.01) << nm;
+        EXPECT_NEAR(mean_at(picture, x, 75, 2), expected.z, 0.01) << nm;
+    }
+}
+
+// A pixel covers many texels of the chessboard.
+TEST(PathMaterials, FarTexturesAreFiltered) {
+    const auto deviation = [](bool has_levels, float repeats) {
+        SceneBuilder scene = in_a_furnace(1);
+        scene::TexelImage board =
+            texture_of(2, 2, {{255, 255, 255, 255}, {0, 0, 0, 255}, {0, 0, 0, 255}, {255, 255, 255, 255}});
+        if (has_levels)
+            scene::add_levels(board);
+        arhost_material material = scene::make_material(ARHOST_MATERIAL_UNLIT);
+        set3(material.diffuse, 1, 1, 1);
+        material.colour_texture = scene.add_texture("board", std::move(board));
+        scene::TriangleMesh mesh = textured_square(60, 0);
+        for (glm::vec2 &t : mesh.texcoords)
+            t *= repeats;
+        scene.add_mesh("square", mesh, material);
+        const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "1"}});
+        double sum = 0;
+        for (std::uint32_t y = 60; y < 90; ++y)
+            for (std::uint32_t x = 85; x < 115; ++x)
+                sum += std::pow(picture.value(x, y, 0) - 0.5, 2);
+        return std::sqrt(sum / 900);
+    };
+    EXPECT_GT(deviation(false, 617.3f), 0.15) << "noise";
+    EXPECT_LT(deviation(true, 617.3f), 0.02) << "grey";
+    EXPECT_GT(deviation(true, 4), 0.15) << "near textures stay sharp";
+}
+
+TEST(PathMaterials, TangentsOfVerticesTurnNormalMaps) {
+    const auto brightness = [](const std::vector<glm::vec4> &tangents) {
+        SceneBuilder scene = in_a_furnace(0);
+        scene::TexelImage slope = texture_of(1, 1, {{218, 128, 218, 255}}); // 45° towards the tangent
+        slope.format = ARHOST_TEXEL_RGBA8;
+        arhost_material material = metallic_roughness({1, 1, 1}, 0, 1);
+        material.normal_texture = scene.add_texture("slope", std::move(slope));
+        scene::TriangleMesh mesh = textured_square(60, 0);
+        mesh.normals.assign(4, {0, 0, 1});
+        mesh.tangents = tangents;
+        scene.add_mesh("square", mesh, material);
+        scene.add_light(sun(-0.6f, 0, -0.8f)); // from +x
+        return mean_at(rendered(std::move(scene)), 100, 75);
+    };
+    const double plain = brightness({}), turned = brightness(std::vector<glm::vec4>(4, {-1, 0, 0, 1}));
+    EXPECT_NEAR(brightness(std::vector<glm::vec4>(4, {1, 0, 0, 1})), plain, 1e-3);
+    EXPECT_GT(plain, 4 * turned);
 }
 
 TEST(PathMaterials, CoatOfABlackSurfaceReflectsFourPercent) {

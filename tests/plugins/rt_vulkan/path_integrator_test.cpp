@@ -5,6 +5,7 @@
 // scene has, so the scenes have few such combinations.
 #include "linear_tracer.hpp"
 #include "rich_scene.hpp"
+#include "scene/image_levels.hpp"
 #include "two_tracers.hpp"
 
 namespace arhost::test {
@@ -90,7 +91,7 @@ SceneBuilder squares_of_all_materials() {
     builder.add_light(placed(ARHOST_LIGHT_POINT, {30, -40, 120}, 9000, ARHOST_FALLOFF_INVERSE_SQUARE));
     int count = 0;
     const auto add = [&](const arhost_material &material, scene::TriangleMesh mesh = square(14), bool hides = false) {
-        const glm::vec3 position(-60 + 40 * (count % 4), 30 - 55 * (count / 4), 12);
+        const glm::vec3 position(-64 + 32 * (count % 5), 45 - 45 * (count / 5), 12);
         mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}, /* set 1 */ {0, 2}, {2, 2}, {2, 0}, {0, 0}};
         builder.add_object("square " + std::to_string(count++),
                            builder.add_triangles(moved(std::move(mesh), position)), builder.add_material(material),
@@ -112,7 +113,7 @@ SceneBuilder squares_of_all_materials() {
     material.thin_walled = 0;
     material.roughness = 0.2f;
     set3(material.extinction, 0.01f, 0.05f, 0.02f);
-    builder.add_mesh("solid", moved(cube(12), {60, 30, 14}), material);
+    builder.add_mesh("solid", moved(cube(12), {32, 45, 14}), material);
     ++count;
     material = scene::make_material(ARHOST_MATERIAL_UNLIT);
     set3(material.diffuse, 0.2f, 0.7f, 0.3f);
@@ -136,6 +137,40 @@ SceneBuilder squares_of_all_materials() {
     material.blends = 0;
     material.alpha_cutoff = 0.4f;
     add(material, coloured);
+    material = metallic_roughness({0.3f, 0.2f, 0.5f}, 0, 0.8f);
+    set3(material.sheen, 0.9f, 0.7f, 0.5f);
+    material.sheen_roughness = 0.4f;
+    add(material);
+    material = metallic_roughness({0.9f, 0.8f, 0.6f}, 1, 0.4f);
+    material.anisotropy = 0.9f;
+    material.anisotropy_direction[0] = 0.6f;
+    material.anisotropy_direction[1] = 0.8f;
+    add(material);
+    scene::TriangleMesh with_tangents = square(14);
+    with_tangents.normals.assign(4, {0, 0, 1});
+    with_tangents.tangents.assign(4, {0.8f, -0.6f, 0, -1});
+    scene::TexelImage slope = texture_of(1, 1, {{180, 150, 220, 255}});
+    slope.format = ARHOST_TEXEL_RGBA8;
+    material.normal_texture = builder.add_texture("slope", std::move(slope));
+    add(material, with_tangents);
+    material = metallic_roughness({0.2f, 0.2f, 0.2f}, 0.3f, 0.3f);
+    material.iridescence = 0.9f;
+    material.iridescence_thickness_nm[1] = 450;
+    add(material);
+    scene::TexelImage board = texture_of(4, 2,
+                                         {{255, 0, 0, 255},
+                                          {0, 255, 0, 255},
+                                          {0, 0, 255, 255},
+                                          {255, 255, 255, 255},
+                                          {0, 0, 0, 255},
+                                          {255, 255, 255, 255},
+                                          {255, 255, 0, 255},
+                                          {0, 255, 255, 255}});
+    scene::add_levels(board);
+    material = diffuse(1, 1, 1);
+    material.colour_texture =
+        builder.add_texture("board", std::move(board), {.image_from_texcoord = {{11, 0}, {0, 7}, {0.3f, 0.1f}}});
+    add(material);
     return builder;
 }
 

@@ -20,7 +20,7 @@ extern "C" {
 #endif
 
 #define ARHOST_SCENE_MAGIC 0x435354534f485241ull /* "ARHOSTSC" */
-#define ARHOST_SCENE_VERSION 5u
+#define ARHOST_SCENE_VERSION 6u
 #define ARHOST_NONE 0xffffffffu
 
 /* An array in the arena: `count` elements, `stride` bytes apart. If `count` is 0, the array is absent. */
@@ -52,6 +52,10 @@ typedef struct arhost_geometry {
     /* Texture coordinates: 2 floats per vertex; (0, 0): top left corner of the image, (1, 1): bottom right. There may
      * be several sets: first the coordinates of all vertices in set 0, then those in set 1, … */
     arhost_buffer texcoords;
+    /* 4 floats per vertex: the unit direction in which u increases, and ±1 = w: v increases along −w · (normal ×
+     * direction). All 0: there is no such direction. Absent, and if the mesh deforms: each triangle has the
+     * directions that its texture coordinates give. */
+    arhost_buffer tangents;
     arhost_buffer colours; /* 4 uint16 per vertex, 0 to 65535 for 0 to 1: linear RGB, which multiplies `ambient` and
                               `diffuse` of the material, and opacity, which multiplies its `opacity` */
     arhost_buffer indices; /* 3 uint32 per triangle, each < positions.count */
@@ -77,7 +81,11 @@ typedef struct arhost_texel_image {
     arhost_texel_format format;
     uint32_t width, height; /* texels, 1 to 16384 */
     uint32_t name;          /* byte offset into `names` of a NUL-terminated string */
-    arhost_buffer texels;   /* width·height, top row first; stride 4 or 16 */
+    uint32_t level_count;   /* 1, or more: smaller versions of the image follow it, for surfaces that are far away.
+                               Level k has max(width >> k, 1) · max(height >> k, 1) texels, each the mean, in linear
+                               light, of those that it covers in level k − 1 */
+    uint32_t reserved;      /* 0 */
+    arhost_buffer texels;   /* of all levels; top row first; stride 4 or 16 */
 } arhost_texel_image;
 
 typedef int32_t arhost_wrap;
@@ -86,7 +94,8 @@ typedef int32_t arhost_texel_filter;
 enum { ARHOST_TEXEL_FILTER_LINEAR = 1, ARHOST_TEXEL_FILTER_NEAREST = 2 };
 
 /* How a material reads an image. The centre of texel (i, j) is at u = (i + ½)/width, v = (j + ½)/height. LINEAR
- * interpolates bilinearly; sRGB texels are linearised before interpolation. */
+ * interpolates bilinearly; sRGB texels are linearised before interpolation. Ray tracers may interpolate between the
+ * two levels whose texels are about as large as the area that a ray from the eye covers. */
 typedef struct arhost_texture {
     uint32_t image; /* index */
     arhost_wrap wrap_u, wrap_v;
@@ -156,6 +165,26 @@ typedef struct arhost_material {
     uint32_t clearcoat_texture, clearcoat_roughness_texture;
     uint32_t clearcoat_normal_texture; /* ARHOST_NONE: the normals of the vertices */
     float clearcoat_normal_scale;
+    /* Metallic-roughness with ARHOST_INTEGRATOR_PATH: fibres above the surface, as of cloth, which reflect light of
+     * this colour at grazing angles. `sheen` is multiplied by the colour of sheen_texture, `sheen_roughness` by the
+     * alpha of its texture; roughnesses below 0.2 count as 0.2. The distribution of their normals is Charlie's
+     * (KHR_materials_sheen). The light that they do not reflect reaches the surface. */
+    float sheen[3], sheen_roughness; /* 0 to 1 */
+    uint32_t sheen_texture, sheen_roughness_texture;
+    /* Metallic-roughness with ARHOST_INTEGRATOR_PATH: the alpha of GGX is roughness² across a direction, and
+     * roughness² + anisotropy² · (1 − roughness²) along it. The direction is anisotropy_direction, in units of the
+     * tangents (the axes of normal_texture). With a texture, its direction (2 · R − 1, 2 · G − 1) is turned by
+     * anisotropy_direction, and B multiplies `anisotropy` (KHR_materials_anisotropy). */
+    float anisotropy;              /* 0 to 1 */
+    float anisotropy_direction[2]; /* cosine and sine of an angle */
+    uint32_t anisotropy_texture;
+    /* Metallic-roughness with ARHOST_INTEGRATOR_PATH: a thin film, of the refractive index `iridescence_index`, on
+     * the share `iridescence` · R of iridescence_texture of the surface. Its thickness is between the two values, at
+     * G of iridescence_thickness_texture; the second one without this texture (KHR_materials_iridescence). */
+    float iridescence;                 /* 0 to 1 */
+    float iridescence_index;           /* 1 to 4 */
+    float iridescence_thickness_nm[2]; /* 0 to 1e5 */
+    uint32_t iridescence_texture, iridescence_thickness_texture;
 
     /* Glass. Its reflectance is clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), or 1 at total
      * internal reflection. c is the cosine of the angle between the normal and the ray on the outside of the glass,

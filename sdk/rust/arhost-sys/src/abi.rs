@@ -602,7 +602,7 @@ unsafe impl Sync for arhost_tracker {} // a plugin's statics are immutable
 // ---- arhost/scene.h ----
 
 pub const ARHOST_SCENE_MAGIC: u64 = 0x435354534f485241;
-pub const ARHOST_SCENE_VERSION: u32 = 5;
+pub const ARHOST_SCENE_VERSION: u32 = 6;
 pub const ARHOST_NONE: u32 = 0xffffffff;
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -626,6 +626,7 @@ pub struct arhost_geometry {
     pub positions: arhost_buffer,
     pub normals: arhost_buffer,
     pub texcoords: arhost_buffer,
+    pub tangents: arhost_buffer,
     pub colours: arhost_buffer,
     pub indices: arhost_buffer,
     pub joints: arhost_buffer,
@@ -633,7 +634,7 @@ pub struct arhost_geometry {
     pub morph_positions: arhost_buffer,
     pub morph_normals: arhost_buffer,
 }
-const _: () = assert!(size_of::<arhost_geometry>() == 152);
+const _: () = assert!(size_of::<arhost_geometry>() == 168);
 pub type arhost_texel_format = i32;
 pub const ARHOST_TEXEL_SRGB8: arhost_texel_format = 1;
 pub const ARHOST_TEXEL_RGBA8: arhost_texel_format = 2;
@@ -645,9 +646,11 @@ pub struct arhost_texel_image {
     pub width: u32,
     pub height: u32,
     pub name: u32,
+    pub level_count: u32,
+    pub reserved: u32,
     pub texels: arhost_buffer,
 }
-const _: () = assert!(size_of::<arhost_texel_image>() == 32);
+const _: () = assert!(size_of::<arhost_texel_image>() == 40);
 pub type arhost_wrap = i32;
 pub const ARHOST_WRAP_REPEAT: arhost_wrap = 1;
 pub const ARHOST_WRAP_CLAMP: arhost_wrap = 2;
@@ -708,6 +711,18 @@ pub struct arhost_material {
     pub clearcoat_roughness_texture: u32,
     pub clearcoat_normal_texture: u32,
     pub clearcoat_normal_scale: f32,
+    pub sheen: [f32; 3],
+    pub sheen_roughness: f32,
+    pub sheen_texture: u32,
+    pub sheen_roughness_texture: u32,
+    pub anisotropy: f32,
+    pub anisotropy_direction: [f32; 2],
+    pub anisotropy_texture: u32,
+    pub iridescence: f32,
+    pub iridescence_index: f32,
+    pub iridescence_thickness_nm: [f32; 2],
+    pub iridescence_texture: u32,
+    pub iridescence_thickness_texture: u32,
     pub index: f32,
     pub fresnel_exponent: f32,
     pub fresnel_minimum: f32,
@@ -720,7 +735,7 @@ pub struct arhost_material {
     pub reflection_depth: u32,
     pub refraction_depth: u32,
 }
-const _: () = assert!(size_of::<arhost_material>() == 240);
+const _: () = assert!(size_of::<arhost_material>() == 304);
 pub type arhost_role = i32;
 pub const ARHOST_ROLE_VIRTUAL: arhost_role = 1;
 pub const ARHOST_ROLE_CATCHER: arhost_role = 2;

@@ -32,9 +32,11 @@ Float turn_of(Float x, Float y) {
 #include "leaf/alpha.h"
 #include "leaf/bsdf.h"
 #include "leaf/environment.h"
+#include "leaf/film.h"
 #include "leaf/lens.h"
 #include "leaf/light.h"
 #include "leaf/sampling.h"
+#include "leaf/sheen.h"
 #include "leaf/surface.h"
 
 #endif

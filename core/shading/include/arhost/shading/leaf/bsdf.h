@@ -146,3 +146,30 @@ ARHOST_LEAF Float ggx_lobe(Float cosine_light, Float cosine_eye, Float cosine_ha
     return Float(3.14159265358979) * cosine_light * ggx_distribution(cosine_half, alpha) *
            ggx_visibility(cosine_light, max(cosine_eye, Float(1e-4)), alpha);
 }
+
+// GGX that reflects further along one axis of the surface than along the other (Burley, Physically Based Shading at
+// Disney, SIGGRAPH 2012 course notes, section B.2; glTF's KHR_materials_anisotropy). Vectors are in coordinates with
+// the surface normal along z; `alpha_x` and `alpha_y` are along x and y. With equal alphas, the functions equal those
+// above.
+ARHOST_LEAF Float anisotropic_distribution(Vec3 half_vector, Float alpha_x, Float alpha_y) {
+    Float x = half_vector.x / alpha_x;
+    Float y = half_vector.y / alpha_y;
+    Float d = x * x + y * y + half_vector.z * half_vector.z;
+    return Float(1.0) / (Float(3.14159265358979) * alpha_x * alpha_y * d * d);
+}
+ARHOST_LEAF Float anisotropic_masking_divisor(Vec3 direction, Float alpha_x, Float alpha_y) {
+    Float x = direction.x * alpha_x;
+    Float y = direction.y * alpha_y;
+    Float cosine = max(direction.z, Float(1e-4));
+    return cosine + sqrt(x * x + y * y + cosine * cosine);
+}
+ARHOST_LEAF Float anisotropic_reflection_density(Vec3 to_eye, Vec3 half_vector, Float alpha_x, Float alpha_y) {
+    return Float(0.5) * anisotropic_distribution(half_vector, alpha_x, alpha_y) /
+           anisotropic_masking_divisor(to_eye, alpha_x, alpha_y);
+}
+ARHOST_LEAF Float anisotropic_lobe(Vec3 to_light, Vec3 to_eye, Vec3 half_vector, Float alpha_x, Float alpha_y) {
+    return Float(3.14159265358979) * max(to_light.z, Float(0.0)) *
+           anisotropic_distribution(half_vector, alpha_x, alpha_y) /
+           (anisotropic_masking_divisor(to_light, alpha_x, alpha_y) *
+            anisotropic_masking_divisor(to_eye, alpha_x, alpha_y));
+}

@@ -44,24 +44,27 @@ ARHOST_LEAF Vec3 cone_direction(Vec3 axis, Float slope, Float u, Float v) {
 }
 
 // Samples the normal of a GGX microfacet that is visible from `to_eye`, in coordinates with the surface normal along
-// z (Dupuy and Benyoub, Sampling Visible GGX Normals with Spherical Caps, CGF 42(8), 2023, listing 1).
-ARHOST_LEAF Vec3 ggx_visible_normal(Vec3 to_eye, Float alpha, Float u, Float v) {
-    Vec3 stretched = vec3(to_eye.x * alpha, to_eye.y * alpha, to_eye.z);
+// z. `alpha_x`, `alpha_y`: along x and y (Dupuy and Benyoub, Sampling Visible GGX Normals with Spherical Caps, CGF
+// 42(8), 2023, listing 1).
+ARHOST_LEAF Vec3 ggx_visible_normal(Vec3 to_eye, Float alpha_x, Float alpha_y, Float u, Float v) {
+    Vec3 stretched = vec3(to_eye.x * alpha_x, to_eye.y * alpha_y, to_eye.z);
     stretched = stretched * (Float(1.0) / sqrt(max(dot(stretched, stretched), Float(1e-12))));
     Float z = (Float(1.0) - v) * (Float(1.0) + stretched.z) - stretched.z;
     Float radius = sqrt(min(max(Float(1.0) - z * z, Float(0.0)), Float(1.0)));
     Vec3 half_vector = vec3(radius * cosine_of_turn(u), radius * sine_of_turn(u), z) + stretched;
-    Vec3 n = vec3(half_vector.x * alpha, half_vector.y * alpha, max(half_vector.z, Float(1e-6)));
+    Vec3 n = vec3(half_vector.x * alpha_x, half_vector.y * alpha_y, max(half_vector.z, Float(1e-6)));
     return n * (Float(1.0) / sqrt(dot(n, n)));
 }
 
-// Like ggx_visible_normal, but in world coordinates with any unit normal of the surface.
-ARHOST_LEAF Vec3 ggx_half_vector(Vec3 normal, Vec3 to_eye, Float alpha, Float u, Float v) {
-    Vec3 x = tangent_axis(normal);
-    Vec3 y = bitangent_axis(normal);
+// Like ggx_visible_normal, but in world coordinates. `x`, `y`, `normal`: axes of the surface, unit vectors.
+ARHOST_LEAF Vec3 anisotropic_half_vector(Vec3 x, Vec3 y, Vec3 normal, Vec3 to_eye, Float alpha_x, Float alpha_y,
+                                         Float u, Float v) {
     Vec3 local = vec3(dot(to_eye, x), dot(to_eye, y), max(dot(to_eye, normal), Float(1e-4)));
-    Vec3 facet = ggx_visible_normal(local, alpha, u, v);
+    Vec3 facet = ggx_visible_normal(local, alpha_x, alpha_y, u, v);
     return x * facet.x + y * facet.y + normal * facet.z;
+}
+ARHOST_LEAF Vec3 ggx_half_vector(Vec3 normal, Vec3 to_eye, Float alpha, Float u, Float v) {
+    return anisotropic_half_vector(tangent_axis(normal), bitangent_axis(normal), normal, to_eye, alpha, alpha, u, v);
 }
 
 // Vector to the point (u, v) of a rectangle. `to_centre`: vector to its centre; `axis_u`, `axis_v`: half sides.

@@ -35,6 +35,18 @@ ARHOST_LEAF Vec3 shading_normal(Vec3 interpolated, Vec3 facet) {
     return facing(n, facet);
 }
 
+// `normal`, bent towards `to_eye` if necessary so that the mirrored ray leaves the surface: half of the angle between
+// `to_eye` and the mirrored ray, raised above the facet. Otherwise, steep normal maps and silhouettes of smooth
+// meshes would be black. All vectors have unit length; `normal` and `to_eye` are on the side of the geometric normal
+// `facet` (C. Keller et al., The Iray Light Transport Simulation and Rendering System, 2017, section A.3).
+ARHOST_LEAF Vec3 reflecting_normal(Vec3 normal, Vec3 facet, Vec3 to_eye) {
+    Vec3 mirrored = normal * (dot(normal, to_eye) * Float(2.0)) - to_eye;
+    Float least = min(dot(facet, to_eye) * Float(0.9), Float(0.01));
+    Float height = dot(mirrored, facet);
+    Vec3 raised = normalize_or(mirrored + facet * (least - height), facet);
+    return select(height < least, normalize_or(to_eye + raised, facet), normal);
+}
+
 // Contribution of one corner to the vector from a point of a flat triangle to the curved surface that the vertex
 // normals describe. The vector is the mean of the three contributions, weighted by the barycentric coordinates.
 // Shadow rays start on the curved surface, so that facets do not shadow themselves where this surface is lit.
@@ -52,6 +64,11 @@ ARHOST_LEAF Vec3 tangent_along_u(Vec3 edge_1, Vec3 edge_2, Float u1, Float u2, F
 }
 ARHOST_LEAF Vec3 tangent_along_v(Vec3 edge_1, Vec3 edge_2, Float u1, Float u2, Float v1, Float v2) {
     return (edge_2 * u1 - edge_1 * u2) * select(u1 * v2 < u2 * v1, Float(-1.0), Float(1.0));
+}
+
+// Unit vector along `along_u`, made orthogonal to the unit `normal`; any such vector if there is none.
+ARHOST_LEAF Vec3 tangent_of(Vec3 normal, Vec3 along_u, Vec3 fallback) {
+    return normalize_or(along_u - normal * dot(normal, along_u), fallback);
 }
 
 // Perturbs `normal` by the `texel` of a normal map. Makes the tangent orthogonal to the normal; the green axis points
