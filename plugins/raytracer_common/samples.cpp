@@ -44,8 +44,9 @@ std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count) {
 }
 
 float ray_angle(const arhost_intrinsics &intrinsics, std::size_t samples_per_pixel) {
+    constexpr double overlap = 4; // fewer samples miss parts of footprints that are long, at grazing angles
     return static_cast<float>(1 / std::sqrt(intrinsics.fx * intrinsics.fy *
-                                            static_cast<double>(std::max<std::size_t>(samples_per_pixel, 1))));
+                                            std::max(static_cast<double>(samples_per_pixel) / overlap, 1.0)));
 }
 
 } // namespace arhost::raytracer_common

@@ -42,7 +42,7 @@ std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count);
 // then below half an 8-bit code, so more samples would not change the image.
 inline constexpr std::uint32_t max_accumulated_samples = 1u << 16;
 
-// Returns the width of a sample from the eye, in units of its distance: together, the samples of a pixel cover it.
+// Returns the width, in units of the distance, of the part of a pixel for which one of its samples filters textures.
 float ray_angle(const arhost_intrinsics &intrinsics, std::size_t samples_per_pixel);
 
 } // namespace arhost::raytracer_common
