@@ -17,19 +17,6 @@ namespace {
 
 constexpr std::size_t max_files_read = 4096; // of which `loaded` and `failed` report; the loader is not trusted
 
-// Returns the sandbox policy of the scene loader. Which files a scene and its meshes refer to is known only after
-// parsing, so the loader may read everything except /proc, /sys and devices. Its only output is the arena.
-sandbox::Policy policy_of(sandbox::Mode mode) {
-    sandbox::Policy policy;
-    policy.mode = mode;
-    policy.makes_shared_memory = true;
-    for (const auto &entry : std::filesystem::directory_iterator("/"))
-        if (const auto name = entry.path().filename(); name != "proc" && name != "sys" && name != "dev")
-            policy.readable.push_back(entry.path());
-    policy.readable.push_back("/dev/shm"); // contains files in memory, not devices
-    return policy;
-}
-
 } // namespace
 
 std::string problem_with(const std::vector<Anchor> &anchors, const run_config::TrackerConfiguration *tracker) {
@@ -51,7 +38,7 @@ SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::p
     : callbacks_(std::move(callbacks)), files_(std::move(files)), scene_(scene.string()),
       loading_(context, {scene, "scene", "scene loader", limits, "raytracer.start_deadline_ms"},
                messages::Load{scene_, {raytracer.readable.begin(), raytracer.readable.end()}},
-               policy_of(raytracer.mode),
+               supervise::policy_of_scene_loader(raytracer.mode),
                {[this](const Message &message) { on_message(message); },
                 [this](SharedMemory arena, std::span<const std::byte> bytes) { on_loaded(std::move(arena), bytes); },
                 [this](const std::string &reason) {

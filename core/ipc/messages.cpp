@@ -208,7 +208,7 @@ template <class T> T parse(const Message &message) {
     ARHOST_CONVERTED(name)
 
 ARHOST_MESSAGE(Open, plugin, sandbox)
-ARHOST_MESSAGE(Load, scene, readable, sandbox)
+ARHOST_MESSAGE(Load, scene, readable, sandbox, content, lists_contents)
 ARHOST_MESSAGE(ReadLog, file, video_bytes, sandbox)
 ARHOST_CONVERTED(ListDevices)
 ARHOST_CONVERTED(Create)
@@ -232,6 +232,7 @@ ARHOST_MESSAGE(CountersChanged, counters)
 ARHOST_CONVERTED(End)
 ARHOST_MESSAGE(Reads, path, node)
 ARHOST_MESSAGE(AnchorOrigin, text)
+ARHOST_MESSAGE(Listed, kind, text, number)
 ARHOST_CONVERTED(Loaded)
 #undef ARHOST_MESSAGE
 #undef ARHOST_CONVERTED

@@ -58,6 +58,8 @@ struct Load {
     std::string scene;                   // path of the scene file
     std::vector<std::string> readable{}; // files and folders that glTF files outside of them may refer to
     Json sandbox{};                      // sandbox::Policy
+    std::string content{};               // of the scene file, which is then not read; "": none
+    bool lists_contents = false;         // the worker sends Listed
 };
 
 // The first message to a worker that reads the log of a session.
@@ -251,6 +253,14 @@ struct Reads {
 struct AnchorOrigin {
     static constexpr const char *type = "anchor-origin";
     std::string text;
+};
+
+// One of scene::Contents: an "animation" with its duration in s, a "variant", a "material", or the number of "nodes".
+// Sent before Loaded.
+struct Listed {
+    static constexpr const char *type = "listed";
+    std::string kind, text;
+    double number = 0;
 };
 
 // The scene is loaded, or the log is read. The descriptor of the memory that contains the arena or the packed log

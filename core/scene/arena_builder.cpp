@@ -266,9 +266,10 @@ std::uint32_t ArenaBuilder::add_anchor(const std::string &target) {
     return node;
 }
 
-std::uint32_t ArenaBuilder::add_material(const arhost_material &material) {
+std::uint32_t ArenaBuilder::add_material(const arhost_material &material, const std::string &name) {
     origins_.add(Table::materials);
     materials_.push_back(material);
+    contents.materials.push_back(name);
     return static_cast<std::uint32_t>(materials_.size() - 1);
 }
 

@@ -161,6 +161,18 @@ private:
     std::unique_ptr<std::byte, Free> bytes_;
 };
 
+// The contents of the files of a scene that only the user needs, and names that are not in the arena.
+struct Contents {
+    struct Animation {
+        std::string name;
+        float duration_s;
+    };
+    std::vector<Animation> animations; // also those that are not selected
+    std::vector<std::string> variants;
+    std::vector<std::string> materials; // names, in the order of the arena; "": none
+    std::size_t nodes = 0;
+};
+
 // Collects a scene, then writes it as one arena:
 //
 //   ArenaBuilder builder;
@@ -172,6 +184,7 @@ class ArenaBuilder {
 public:
     Settings settings;
     Environment environment;
+    Contents contents;
 
     // Sets the origin of the elements that are added from now on.
     void set_origin(std::string origin) { origins_.set(std::move(origin)); }
@@ -184,7 +197,7 @@ public:
     std::uint32_t add_texture(const Texture &texture);
     // Adds an image, and `texture` to show it.
     std::uint32_t add_texture(const std::string &name, TexelImage image, Texture texture = {});
-    std::uint32_t add_material(const arhost_material &material);
+    std::uint32_t add_material(const arhost_material &material, const std::string &name = "");
     std::uint32_t add_object(const std::string &name, std::uint32_t geometry, std::uint32_t material,
                              arhost_role role = ARHOST_ROLE_VIRTUAL,
                              const glm::mat4x3 &world_from_object = glm::mat4x3(1), const Motion &motion = {},

@@ -176,7 +176,7 @@ std::uint32_t MtlMaterials::add(const MaterialUses::Name &name) {
     if (found == materials_.end())
         throw MeshError(obj_.string() + ":" + std::to_string(name.line) + ": no MTL file defines the material '" +
                         printable(name.text) + "'; define it, or add the key 'material' to the object");
-    return builder_.add_material(converted(found->second));
+    return builder_.add_material(converted(found->second), name.text);
 }
 
 std::uint32_t MtlMaterials::add_default() {

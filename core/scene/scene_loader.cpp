@@ -654,7 +654,7 @@ public:
         const Node materials = root_.require("materials");
         for (const auto &[name, node] : materials.entries()) {
             set_origin(node);
-            if (!materials_.emplace(name, builder_.add_material(material_of(node, textures_))).second)
+            if (!materials_.emplace(name, builder_.add_material(material_of(node, textures_), name)).second)
                 node.fail("another material has the same name; rename or remove one of them");
         }
         if (const auto lights = root_.find("lights"))

@@ -5,6 +5,17 @@ namespace arhost::supervise {
 
 using namespace ipc;
 
+sandbox::Policy policy_of_scene_loader(sandbox::Mode mode) {
+    sandbox::Policy policy;
+    policy.mode = mode;
+    policy.makes_shared_memory = true;
+    for (const auto &entry : std::filesystem::directory_iterator("/"))
+        if (const auto name = entry.path().filename(); name != "proc" && name != "sys" && name != "dev")
+            policy.readable.push_back(entry.path());
+    policy.readable.push_back("/dev/shm"); // contains files in memory, not devices
+    return policy;
+}
+
 void Loading::set_deadlines() {
     restart_deadline();
     total_deadline_ = context_.reactor.at(context_.reactor.now() + job_.limits.start_total, [this] {

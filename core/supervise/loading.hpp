@@ -15,6 +15,10 @@
 
 namespace arhost::supervise {
 
+// Returns the sandbox policy of the scene loader. Which files a scene and its meshes refer to is known only after
+// parsing, so the loader may read everything except /proc, /sys and devices. Its only output is the arena.
+sandbox::Policy policy_of_scene_loader(sandbox::Mode mode);
+
 class Loading {
 public:
     struct Job {

@@ -2,6 +2,7 @@
 #include "worker/loader.hpp"
 
 #include "base/file_identity.hpp"
+#include "base/text.hpp"
 #include "scene/scene_loader.hpp"
 #include "session/log_reader.hpp"
 
@@ -24,6 +25,19 @@ void send_memory(const Link &link, const char *name, std::size_t size,
     link.send(ipc::messages::Loaded{}, {memory.fd()});
 }
 
+void send_contents(const Link &link, const scene::Contents &contents) {
+    const auto send = [&](const char *kind, const std::string &text, double number = 0) {
+        link.send(ipc::messages::Listed{kind, base::valid_utf8(text), number});
+    };
+    for (const auto &[name, duration_s] : contents.animations)
+        send("animation", name, duration_s);
+    for (const std::string &name : contents.variants)
+        send("variant", name);
+    for (const std::string &name : contents.materials)
+        send("material", name);
+    send("nodes", "", static_cast<double>(contents.nodes));
+}
+
 } // namespace
 
 int load_scene(Link &link, const ipc::messages::Load &load) {
@@ -35,8 +49,11 @@ int load_scene(Link &link, const ipc::messages::Load &load) {
         const base::FileIdentity identity = base::identity_of(file);
         link.send(ipc::messages::Reads{identity.path, identity.node});
     };
-    scene::ArenaBuilder builder =
-        scene::load_scene(load.scene, callbacks, {load.readable.begin(), load.readable.end()});
+    const yaml::Node root =
+        load.content.empty() ? yaml::Node::load(load.scene) : yaml::Node::parse(load.content, load.scene);
+    scene::ArenaBuilder builder = scene::load_scene(root, callbacks, {load.readable.begin(), load.readable.end()});
+    if (load.lists_contents)
+        send_contents(link, builder.contents);
     const scene::Origins origins = builder.origins();
     send_memory(link, "arhost-scene", builder.byte_size(), [&](std::span<std::byte> memory) {
         std::move(builder).write(memory);

@@ -65,6 +65,7 @@ public:
     float load() {
         check_extensions();
         collect_nodes();
+        builder_.contents.nodes += nodes_.size();
         choose_animations();
         choose_variant();
         count_uses();
@@ -243,7 +244,20 @@ private:
                    : nullptr;
     }
 
+    // The specification requires that the accessor of the times has a maximum.
+    float duration_of(const tinygltf::Animation &animation) const {
+        double duration_s = 0;
+        for (const tinygltf::AnimationSampler &sampler : animation.samplers)
+            if (static_cast<std::size_t>(sampler.input) < model_.accessors.size()) // else fails only if selected
+                if (const auto &maxima = model_.accessors[static_cast<std::size_t>(sampler.input)].maxValues;
+                    !maxima.empty())
+                    duration_s = std::max(duration_s, maxima.front());
+        return static_cast<float>(std::min<double>(duration_s, duration_limit_s));
+    }
+
     void choose_animations() {
+        for (const tinygltf::Animation &animation : model_.animations)
+            builder_.contents.animations.push_back({animation.name, duration_of(animation)});
         std::string names;
         for (std::size_t i = 0; i < model_.animations.size(); ++i)
             names += (i ? ", " : "") + std::to_string(i) + " '" + printable(model_.animations[i].name) + "'";
@@ -504,6 +518,7 @@ private:
                 const std::vector<JsonNode> items = variants->items();
                 for (std::size_t i = 0; i < items.size(); ++i) {
                     const std::string name = items[i].text_or("name", "");
+                    builder_.contents.variants.push_back(name);
                     if (name == placement_.variant && !variant_)
                         variant_ = i;
                     names += (i ? ", '" : "'") + printable(name) + "'";

@@ -55,7 +55,7 @@ GltfMaterials::Material GltfMaterials::read(const JsonNode &node) {
     read_opacity(node, base_colour[3], material);
     if (node.extension("KHR_materials_unlit")) {
         material.model = ARHOST_MATERIAL_UNLIT;
-        return {builder_.add_material(material), node.boolean_or("doubleSided", false)};
+        return {builder_.add_material(material, node.text_or("name", "")), node.boolean_or("doubleSided", false)};
     }
     material.metallic_roughness_texture = texture_of(pbr, "metallicRoughnessTexture", false);
     if (const auto texture = node.find("normalTexture")) {
@@ -79,7 +79,8 @@ GltfMaterials::Material GltfMaterials::read(const JsonNode &node) {
     read_anisotropy(node, material);
     read_iridescence(node, material);
     const bool is_volume = material.transmission > 0 && material.thin_walled == 0; // its back faces end it
-    return {builder_.add_material(material), node.boolean_or("doubleSided", false) || is_volume};
+    return {builder_.add_material(material, node.text_or("name", "")),
+            node.boolean_or("doubleSided", false) || is_volume};
 }
 
 void GltfMaterials::read_opacity(const JsonNode &node, float factor, arhost_material &material) const {

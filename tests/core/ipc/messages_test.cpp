@@ -128,6 +128,7 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(sent(messages::Failed{ARHOST_STATUS_ERROR_CONFIGURATION, "why"}).text, "why");
     EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");
     EXPECT_EQ(sent(messages::AnchorOrigin{"scene.yaml:6:40: objects[0].on"}).text, "scene.yaml:6:40: objects[0].on");
+    EXPECT_EQ(sent(messages::Listed{"animation", "Walk", 0.7}).number, 0.7);
     const Counters counters = {{"lost", 3}, {"superseded", 0}};
     EXPECT_EQ(sent(messages::CountersChanged{counters}).counters, counters);
 }

@@ -115,6 +115,7 @@ Gltf skinned() {
 struct Loaded {
     Arena arena;
     std::vector<std::string> info;
+    arhost::scene::Contents contents;
 };
 
 Loaded load(const std::string &gltf, const std::string &object = "", const std::string &axes = "y-up",
@@ -127,8 +128,9 @@ Loaded load(const std::string &gltf, const std::string &object = "", const std::
     LoadCallbacks callbacks;
     std::vector<std::string> info;
     callbacks.info = [&](const std::string &text) { info.push_back(text); };
-    Arena arena = build(load_scene(folder.path() / "s.yaml", callbacks));
-    return {std::move(arena), info};
+    arhost::scene::ArenaBuilder builder = load_scene(folder.path() / "s.yaml", callbacks);
+    const arhost::scene::Contents contents = builder.contents;
+    return {build(std::move(builder)), info, contents};
 }
 
 std::string error_of(const std::string &gltf, const std::string &object = "") {
@@ -615,9 +617,12 @@ TEST(Gltf, ChoosesAVariant) {
         Gltf gltf = triangle();
         gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "material": 0, "extensions":
             {"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [1]}]}}}]})";
-        gltf.more = R"(, "materials": [{}, {"pbrMetallicRoughness": {"baseColorFactor": [0, 1, 0, 1]}}],
+        gltf.more =
+            R"(, "materials": [{}, {"name": "paint", "pbrMetallicRoughness": {"baseColorFactor": [0, 1, 0, 1]}}],
             "extensions": {"KHR_materials_variants": {"variants": [{"name": "beach"}, {"name": "street"}]}})";
         const Loaded loaded = load(gltf.text(), object);
+        EXPECT_THAT(loaded.contents.variants, ElementsAre("beach", "street"));
+        EXPECT_THAT(loaded.contents.materials.back(), object.ends_with("street") ? "paint" : "");
         if (object.empty()) {
             EXPECT_THAT(loaded.info,
                         Contains(HasSubstr("no variant selected; available for 'variant': 'beach', 'street'")));
@@ -657,6 +662,9 @@ TEST(Gltf, StoresMeshesOfSeveralNodesAndInstancesOnce) {
 TEST(Gltf, IsStaticWithoutAnAnimation) {
     const Loaded loaded = load(skinned().text());
     EXPECT_EQ(loaded.arena.scene().duration_s, 0);
+    ASSERT_EQ(loaded.contents.animations.size(), 1u);
+    EXPECT_EQ(loaded.contents.animations[0].name, "wave");
+    EXPECT_GT(loaded.contents.nodes, 0u);
     EXPECT_EQ(object(loaded.arena).deforms, 0u);
     EXPECT_EQ(geometry(loaded.arena).joints.count, 0u);
     EXPECT_THAT(vertex(loaded.arena, 2), ElementsAre(0, 1, 0)) << "the transform of a skinned node is ignored";
