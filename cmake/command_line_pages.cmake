@@ -4,7 +4,7 @@ find_program(GZIP gzip REQUIRED)
 set(pages_directory ${CMAKE_BINARY_DIR}/pages)
 file(MAKE_DIRECTORY ${pages_directory})
 set(pages)
-foreach(program arhost arhost-inprocess ${ARHOST_COMMANDS} render-scene)
+foreach(program arhost arhost-inprocess ${ARHOST_COMMANDS})
   set(page ${pages_directory}/${program}.1.gz)
   add_custom_command(OUTPUT ${page} DEPENDS ${program} command-line-pages VERBATIM
                      COMMAND ${program} --describe | $<TARGET_FILE:command-line-pages> man > ${program}.1

@@ -2,7 +2,7 @@
 # Install rules and the Debian package. All files are located relative to the programs, so the installation can be moved;
 # therefore `lib` has no architecture suffix.
 install(TARGETS arhost arhost-inprocess EXPORT arhost RUNTIME DESTINATION bin)
-install(TARGETS ${ARHOST_COMMANDS} arhost-launcher arhost-worker render-scene RUNTIME DESTINATION bin)
+install(TARGETS ${ARHOST_COMMANDS} arhost-launcher arhost-worker RUNTIME DESTINATION bin)
 set_target_properties(arhost-inprocess PROPERTIES EXPORT_NAME inprocess)
 install(TARGETS arhost-images LIBRARY DESTINATION lib/arhost)
 # Plugins: see arhost_add_plugin.

@@ -12,7 +12,7 @@ import sys
 
 import peers
 
-render_scene = os.path.join(peers.binaries, "render-scene")
+view = os.path.join(peers.binaries, "arhost-view")
 shared = os.path.join(peers.root, "..", "shared", "data", "env")
 roughnesses = [0, 0.25, 0.5, 0.75, 1]
 samples = 64
@@ -36,8 +36,8 @@ def write_sun(path):
 
 def main():
     arguments = [word for word in sys.argv[1:] if word != "--quick"]
-    if not os.path.exists(render_scene):
-        raise SystemExit("metal: build/release/bin/render-scene is missing: run tools/bench metal")
+    if not os.path.exists(view):
+        raise SystemExit("metal: build/release/bin/arhost-view is missing: run tools/bench metal")
     os.makedirs(peers.folder, exist_ok=True)
     peers.install({name: peers.packages.get(name) for name in ("mitsuba", "pillow", "numpy")})
     images = [os.path.abspath(path) for path in arguments]
@@ -71,9 +71,9 @@ def main():
         pictures = []
         for tracer in ("rt_embree", "rt_vulkan"):
             picture = os.path.join(peers.folder, f"metal-{name}-{tracer}.png")
-            run = subprocess.run([render_scene, scene, "--raytracer", tracer, "--eye=0,0,300", "--look-at=0,0,0",
-                                  "--size=640x160", "--fov=30", f"--samples={samples}", "--transparent", "--output",
-                                  picture], stderr=subprocess.PIPE, text=True, check=False)
+            run = subprocess.run([view, scene, "--raytracer", tracer, "--eye=0,0,300", "--look-at=0,0,0", "--size=640x160",
+                                  "--fov=30", f"--samples={samples}", "--transparent", "--output", picture],
+                                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
             if run.returncode == 0:
                 pictures.append((tracer, picture))
             elif tracer == "rt_vulkan": # it needs a Vulkan device

@@ -10,12 +10,14 @@
 
 namespace arhost::base {
 
-// A folder for temporary files, which the destructor deletes. `name`: the beginning of the folder's name.
+// A folder for temporary files, which the destructor deletes. `name`: the beginning of the folder's name. `parent`:
+// the folder that contains it; empty: that of the system.
 class TemporaryFolder {
 public:
-    explicit TemporaryFolder(const std::string &name) {
+    explicit TemporaryFolder(const std::string &name, std::filesystem::path parent = {}) {
         std::error_code error;
-        const std::filesystem::path parent = std::filesystem::temp_directory_path(error);
+        if (parent.empty())
+            parent = std::filesystem::temp_directory_path(error);
         if (error)
             throw std::runtime_error(
                 "the folder for temporary files does not exist; set TMPDIR to an existing folder");

@@ -106,6 +106,7 @@ constexpr struct {
     {"calibrate", "Calibrate a camera with a printed board (docs/calibration.md)"},
     {"place", "Put a model on a marker: write a scene and a configuration, and run them"},
     {"map", "Learn where markers are relative to each other, from images (docs/maps.md)"},
+    {"view", "Show a model or a scene in a window, or write a picture or a film (docs/scenes.md)"},
 };
 
 // Replaces this process with the program of the subcommand (exec).

@@ -51,7 +51,7 @@ void protect_programs(const run_config::FilesInUse &files) {
     std::error_code ignored;
     for (fs::directory_iterator entry(base::own_folder(), ignored), end; !ignored && entry != end;
          entry.increment(ignored))
-        if (const std::string name = entry->path().filename(); name.starts_with("arhost") || name == "render-scene")
+        if (const std::string name = entry->path().filename(); name.starts_with("arhost"))
             files.protect(base::identity_of(entry->path()));
     for (fs::recursive_directory_iterator entry(base::own_prefix() / "lib/arhost", ignored), end;
          !ignored && entry != end; entry.increment(ignored))

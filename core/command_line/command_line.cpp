@@ -171,7 +171,7 @@ template Option CommandLine::option(const std::string &, std::optional<std::uint
 template Option CommandLine::option(const std::string &, std::optional<std::uint64_t> &, const std::string &);
 template Option CommandLine::option(const std::string &, std::string &, const std::string &);
 template Option CommandLine::option(const std::string &, std::filesystem::path &, const std::string &);
-template Option CommandLine::option(const std::string &, std::array<double, 3> &, const std::string &);
+template Option CommandLine::option(const std::string &, std::optional<std::array<double, 3>> &, const std::string &);
 template Option CommandLine::option(const std::string &, std::array<std::uint32_t, 2> &, const std::string &);
 template Option CommandLine::option(const std::string &, std::vector<std::string> &, const std::string &);
 template Option CommandLine::option(const std::string &, std::vector<std::filesystem::path> &, const std::string &);

@@ -551,7 +551,7 @@ TEST(CommandLine, HasAManPageForEachProgram) {
     for (const char *program :
          {"arhost", "arhost-calibrate", "arhost-conform", "arhost-ctl", "arhost-devices", "arhost-inprocess",
           "arhost-launcher", "arhost-map", "arhost-marker", "arhost-new-plugin", "arhost-plugins", "arhost-schema",
-          "arhost-worker", "render-scene"})
+          "arhost-view", "arhost-worker"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
     ArhostRun run;
     EXPECT_EQ(run_shell(run, "zcat '" + (pages / "arhost.1.gz").string() + "'"), 0);
