@@ -106,6 +106,9 @@ std::string material_text(const arhost_scene &scene, const arhost_material &mate
         fmt::format("transmission {:.2g} ({})", material.transmission,
                     material.thin_walled ? "thin wall" : fmt::format("volume, index {:.3g}", material.index)));
     add(is_rough && material.clearcoat > 0, fmt::format("clear coat {:.2g}", material.clearcoat));
+    add(is_rough && is_above_zero(material.sheen), fmt::format("sheen, roughness {:.2g}", material.sheen_roughness));
+    add(is_rough && material.anisotropy > 0, fmt::format("anisotropy {:.2g}", material.anisotropy));
+    add(is_rough && material.iridescence > 0, fmt::format("iridescence {:.2g}", material.iridescence));
     add(material.model == ARHOST_MATERIAL_GLASS, fmt::format("index {:.3g}", material.index));
     add(material.blends != 0, "blended");
     add(material.alpha_cutoff > 0, fmt::format("cut out below {:.2g}", material.alpha_cutoff));
