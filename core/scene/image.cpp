@@ -36,6 +36,8 @@ ReadImage *reader() {
     return found;
 }
 
+constexpr std::ptrdiff_t start_size = 12; // bytes of a file that show its format
+
 // Returns OpenImageIO's name of the format, according to the file's magic number, because file extensions are
 // unreliable. Only the decoders named here are ever used.
 const char *format_of(std::string_view start) {
@@ -46,6 +48,8 @@ const char *format_of(std::string_view start) {
         return "jpeg";
     if (start.starts_with("\x76\x2f\x31\x01"sv))
         return "openexr";
+    if (start.starts_with("RIFF"sv) && start.substr(std::min<std::size_t>(8, start.size())).starts_with("WEBP"sv))
+        return "webp";
     if (start.starts_with("#?"sv))
         return "hdr";
     if (start.size() > 2 && start[0] == 'P' && (std::string_view("123456Ff").find(start[1]) != start.npos))
@@ -59,7 +63,7 @@ std::string start_of(const std::filesystem::path &file) {
         throw ImageError(file.string() + ": is not a regular file");
     errno = 0;
     std::ifstream stream(file, std::ios::binary);
-    char start[8] = {};
+    char start[start_size] = {};
     stream.read(start, sizeof start);
     if (stream.gcount() == 0)
         throw ImageError(file.string() + (errno ? std::string(": cannot be read: ") + std::strerror(errno)
@@ -113,16 +117,24 @@ void accumulate(std::span<const double> values, std::span<float> sums) {
 
 } // namespace
 
-Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content,
-                 const Reporter &reporter) {
+void ImageBudget::take(std::uint64_t bytes, const std::string &name) {
+    if (bytes > left_)
+        throw ImageError(name + ": the decoded images of a scene may have at most " + std::to_string(limit_ >> 20) +
+                         " MiB together, and this one exceeds it by " + std::to_string(((bytes - left_) >> 20) + 1) +
+                         " MiB; scale some of them down");
+    left_ -= bytes;
+}
+
+Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Reporter &reporter,
+                 ImageBudget &budget) {
     const std::string name = file.string();
     if (content.empty())
         reporter.reads(file);
     const char *format = format_of(
         content.empty() ? start_of(file)
-                        : std::string(content.begin(), content.begin() + std::min<std::size_t>(8, content.size())));
+                        : std::string(content.begin(), content.begin() + std::min<std::size_t>(start_size, content.size())));
     if (!format)
-        throw ImageError(name + ": is not a PNG, JPEG, PPM, HDR or EXR image; convert it to one of these formats");
+        throw ImageError(name + ": is not a PNG, JPEG, WebP, PPM, HDR or EXR image; convert it to one of these formats");
     Image image;
     std::exception_ptr stopped; // exceptions must not propagate through OpenImageIO
     ImageRequest request{format, name, content, {}, {}};
@@ -130,7 +142,9 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
         image.width = width;
         image.height = height;
         image.is_float = is_float;
-        image.texels = Texels::of_size(std::size_t(width) * height * (is_float ? 16 : 4));
+        const std::size_t size = std::size_t(width) * height * (is_float ? 16 : 4);
+        budget.take(size, name);
+        image.texels = Texels::of_size(size);
         return image.texels.bytes.get();
     };
     request.report = [&](float fraction) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Images for textures and environments: PNG, JPEG, PNM, Radiance HDR and OpenEXR. Private to core/scene.
+// Images for textures and environments: PNG, JPEG, WebP, PNM, Radiance HDR and OpenEXR. Private to core/scene.
 #pragma once
 
 #include "scene/arena_builder.hpp"
+#include "scene/arena_limits.hpp"
 #include "scene/callbacks.hpp"
 
 #include <filesystem>
@@ -25,9 +26,21 @@ struct Image {
     Texels texels;         // the top row is first
 };
 
+// Limits the decoded images of a scene in total: a small file may expand to gigabytes.
+class ImageBudget {
+public:
+    explicit ImageBudget(std::uint64_t bytes = image_bytes_limit) : limit_(bytes), left_(bytes) {}
+    // Call it before decoding. Throws ImageError if nothing is left. `name`: of the image.
+    void take(std::uint64_t bytes, const std::string &name);
+
+private:
+    std::uint64_t limit_, left_;
+};
+
 // Decodes `content`, the bytes of an image file, or reads `file` if `content` is empty. Converts integer channels to
 // 8 bits and keeps floats. Expands grey to RGB; images without alpha become opaque. Throws ImageError.
-Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Reporter &reporter);
+Image read_image(const std::filesystem::path &file, std::span<const unsigned char> content, const Reporter &reporter,
+                 ImageBudget &budget);
 
 // Converts to RGBA floats in linear light; decodes sRGB-encoded bytes.
 Image linearized(Image image, const Reporter &reporter);

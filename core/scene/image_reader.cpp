@@ -3,8 +3,10 @@
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <webp/decode.h>
 
 #include <memory>
+#include <vector>
 
 namespace {
 
@@ -22,7 +24,42 @@ template <class T> void expand(T *texels, std::size_t count, bool grey, int alph
     }
 }
 
+std::string size_error(int width, int height) {
+    return width < 1 || height < 1 || width > side_limit || height > side_limit
+               ? "has " + std::to_string(width) + " x " + std::to_string(height) + " pixels; the limit is " +
+                     std::to_string(side_limit) + " per side, so scale it down"
+               : "";
+}
+
+// OpenImageIO allocates the memory for a WebP image before the size can be checked.
+std::string read_webp(const ImageRequest &request) {
+    std::vector<unsigned char> file;
+    std::span<const unsigned char> content = request.content;
+    if (content.empty()) {
+        OIIO::Filesystem::IOFile from(request.file, OIIO::Filesystem::IOProxy::Read);
+        file.resize(from.size());
+        if (from.read(file.data(), file.size()) != file.size())
+            return "cannot be read";
+        content = file;
+    }
+    WebPBitstreamFeatures features;
+    if (WebPGetFeatures(content.data(), content.size(), &features) != VP8_STATUS_OK)
+        return "cannot be loaded: it is not a WebP image, or is truncated";
+    if (features.has_animation)
+        return "is an animated WebP image, which cannot be a texture";
+    if (const std::string error = size_error(features.width, features.height); !error.empty())
+        return error;
+    const auto width = static_cast<std::uint32_t>(features.width), height = static_cast<std::uint32_t>(features.height);
+    std::byte *texels = request.allocate(width, height, false);
+    if (!WebPDecodeRGBAInto(content.data(), content.size(), reinterpret_cast<std::uint8_t *>(texels),
+                            std::size_t(4) * width * height, features.width * 4))
+        return "cannot be loaded: it is corrupt or truncated";
+    return {};
+}
+
 std::string read(const ImageRequest &request) {
+    if (std::string_view(request.format) == "webp")
+        return read_webp(request);
     const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(request.format);
     if (!input)
         return "cannot be loaded: this build of OpenImageIO does not support the format '" +
@@ -37,9 +74,8 @@ std::string read(const ImageRequest &request) {
         return "cannot be loaded: " + input->geterror();
     if (spec.deep || spec.depth > 1 || spec.nchannels < 1)
         return "is a deep or volume image, which cannot be a texture";
-    if (spec.width < 1 || spec.height < 1 || spec.width > side_limit || spec.height > side_limit)
-        return "has " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels; the limit is " +
-               std::to_string(side_limit) + " per side, so scale it down";
+    if (const std::string error = size_error(spec.width, spec.height); !error.empty())
+        return error;
     const bool is_float = spec.format.is_floating_point();
     // The image is grey, grey with alpha, RGB, or RGBA. Additional channels of EXR files are ignored.
     const bool grey = spec.nchannels < 3;

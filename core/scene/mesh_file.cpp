@@ -17,9 +17,6 @@ namespace arhost::scene {
 namespace {
 
 constexpr std::size_t chunk = 1 << 20; // bytes read between two progress reports
-// A compressed file may expand to this multiple of its size, or to max_small_expansion bytes if that is more.
-// Compression reduces meshes to between a third and a tenth, and a file of only zeros to a thousandth.
-constexpr std::uint64_t max_expansion = 100, max_small_expansion = 16 << 20;
 
 class File {
 public:
@@ -89,8 +86,7 @@ public:
     GzipReader &operator=(const GzipReader &) = delete;
 
     Bytes run(std::uint64_t file_limit, const Reporter &reporter) {
-        const std::uint64_t expanded_limit =
-            std::max<std::uint64_t>(max_small_expansion, max_expansion * std::uint64_t(compressed_.size()));
+        const std::uint64_t expanded_limit = expansion_limit(compressed_.size());
         const std::uint64_t byte_limit = std::min(file_limit, expanded_limit);
         Bytes out;
         out.resize(estimated_size(byte_limit));

@@ -18,6 +18,12 @@
 
 namespace arhost::scene {
 
+// Returns how many bytes `compressed_bytes` may expand to: 100 times as many, or 16 MiB if that is more. Compression
+// reduces meshes to between a third and a tenth, and a file of only zeros to a thousandth.
+constexpr std::uint64_t expansion_limit(std::uint64_t compressed_bytes) {
+    return std::max<std::uint64_t>(16 << 20, 100 * compressed_bytes);
+}
+
 // Growable buffer that leaves new bytes uninitialized.
 class Bytes {
 public:
@@ -37,7 +43,7 @@ private:
 class MeshFile {
 public:
     // Throws MeshError, also if the file or its decompressed content has more than `byte_limit` bytes, or if the
-    // content is over 16 MiB and over 100 times as large as the compressed file.
+    // content exceeds the expansion limit.
     static MeshFile read(const std::filesystem::path &file, std::uint64_t byte_limit, const Reporter &reporter);
 
     const char *begin() const { return bytes_.get()->data(); }

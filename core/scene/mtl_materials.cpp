@@ -86,13 +86,13 @@ template <class Add> std::uint32_t added(const MtlTexture &texture, const Add &a
     }
 }
 
-Image bytes_of(const std::filesystem::path &file, const LoadCallbacks &callbacks) {
+Image bytes_of(const std::filesystem::path &file, Textures &textures) {
     if (file.empty()) {
         Image white{1, 1, false, Texels::of_size(sizeof(Texel))};
         std::ranges::fill(white.texels.span(), std::byte(255));
         return white;
     }
-    Image image = read_image(file, {}, Reporter(callbacks, file.filename().string()));
+    Image image = textures.read(file);
     if (image.is_float)
         throw ImageError(file.string() + ": has floating-point texels; convert it to PNG or JPEG");
     return image;
@@ -233,7 +233,7 @@ void MtlMaterials::read_textures(const Material &material, arhost_material &to) 
     } else if (mtl.bump_map) {
         const std::filesystem::path file = file_of(material, *mtl.bump_map);
         const auto make = [&](const LoadCallbacks &callbacks) -> TexelImage {
-            Image image = bytes_of(file, callbacks);
+            Image image = bytes_of(file, textures_);
             if (!is_normal_map(image))
                 return normals_of_heights(image, Reporter(callbacks, file.filename().string()));
             return {ARHOST_TEXEL_RGBA8, image.width, image.height, std::move(image.texels)};
@@ -258,7 +258,7 @@ std::uint32_t MtlMaterials::combined(const Material &material, const std::option
                                      const Combine &combine) {
     const std::filesystem::path file_a = a ? file_of(material, *a) : "", file_b = b ? file_of(material, *b) : "";
     const auto make = [&](const LoadCallbacks &callbacks) -> TexelImage {
-        const Image image_a = bytes_of(file_a, callbacks), image_b = bytes_of(file_b, callbacks);
+        const Image image_a = bytes_of(file_a, textures_), image_b = bytes_of(file_b, textures_);
         const std::span<const Texel> texels_a = texels_of(image_a), texels_b = texels_of(image_b);
         const auto channels = combine(texels_b);
         const std::uint32_t width = std::max(image_a.width, image_b.width),

@@ -18,12 +18,12 @@ LoadCallbacks Textures::image_callbacks() const {
 std::uint32_t Textures::add(const std::filesystem::path &file, const TextureUse &use,
                             std::span<const unsigned char> content, const std::string &part) {
     return add(file.lexically_normal().string() + part, use.is_colour ? "sRGB" : "linear", use.lookup,
-               [&](const LoadCallbacks &callbacks) -> TexelImage {
-                   Image read = read_image(file, content, Reporter(callbacks, file.filename().string()));
-                   const arhost_texel_format format = read.is_float   ? ARHOST_TEXEL_RGBA32F
+               [&](const LoadCallbacks &) -> TexelImage {
+                   Image image = read(file, content);
+                   const arhost_texel_format format = image.is_float  ? ARHOST_TEXEL_RGBA32F
                                                       : use.is_colour ? ARHOST_TEXEL_SRGB8
                                                                       : ARHOST_TEXEL_RGBA8;
-                   return {format, read.width, read.height, std::move(read.texels)};
+                   return {format, image.width, image.height, std::move(image.texels)};
                });
 }
 
@@ -45,10 +45,15 @@ std::uint32_t Textures::add(const std::string &name, const char *kind, const Tex
     return known->second;
 }
 
+Image Textures::read(const std::filesystem::path &file, std::span<const unsigned char> content) {
+    const LoadCallbacks callbacks = image_callbacks();
+    return read_image(file, content, Reporter(callbacks, file.filename().string()), budget_);
+}
+
 Environment Textures::add_environment(const std::filesystem::path &file) {
     const LoadCallbacks callbacks = image_callbacks();
     const Reporter reporter(callbacks, file.filename().string());
-    Image image = linearized(read_image(file, {}, reporter), reporter);
+    Image image = linearized(read(file), reporter);
     return add_environment(printable(file.string()),
                            {ARHOST_TEXEL_RGBA32F, image.width, image.height, std::move(image.texels)}, reporter);
 }

@@ -29,6 +29,9 @@ public:
     std::uint32_t add(const std::string &name, const char *kind, const Texture &lookup,
                       const std::function<TexelImage(const LoadCallbacks &)> &make);
 
+    // Reads an image without adding it, for images that are computed from others. Throws ImageError.
+    Image read(const std::filesystem::path &file, std::span<const unsigned char> content = {});
+
     // Loads an environment map and computes its cumulative sums. Throws ImageError.
     Environment add_environment(const std::filesystem::path &file);
     // Adds an environment map (RGBA32F) and computes its cumulative sums.
@@ -40,6 +43,7 @@ private:
 
     ArenaBuilder &builder_;
     const LoadCallbacks &callbacks_;
+    ImageBudget budget_;
     std::map<std::string, std::uint32_t> images_;   // key: name and kind
     std::map<std::string, std::uint32_t> textures_; // key: the bytes of a Texture
 };

@@ -40,7 +40,7 @@ void send_contents(const Link &link, const scene::Contents &contents) {
 
 } // namespace
 
-int load_scene(Link &link, const ipc::messages::Load &load) {
+int load_scene(Link &link, const ipc::messages::Load &load) try {
     scene::LoadCallbacks callbacks;
     callbacks.progress = [&](double fraction, const std::string &what) { link.progress(fraction, what.c_str()); };
     callbacks.info = [&](const std::string &text) { link.log(ARHOST_SEVERITY_INFO, text); };
@@ -64,6 +64,8 @@ int load_scene(Link &link, const ipc::messages::Load &load) {
             link.send(ipc::messages::AnchorOrigin{origin});
     });
     return EXIT_SUCCESS;
+} catch (const std::bad_alloc &) {
+    throw std::runtime_error(load.scene + ": needs more memory than a worker may use");
 }
 
 int read_log(Link &link, const ipc::messages::ReadLog &request) {

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -33,6 +34,15 @@ public:
 
     std::size_t count(int index) const { return at(model_.accessors, index, "accessor").count; }
     int type(int index) const { return at(model_.accessors, index, "accessor").type; } // TINYGLTF_TYPE_…
+
+    // Returns the bytes of a buffer view. `name`: for messages.
+    std::span<const unsigned char> view(int index, const std::string &name) const {
+        const tinygltf::BufferView &view = at(model_.bufferViews, index, "buffer view");
+        const auto &data = at(model_.buffers, view.buffer, "buffer").data;
+        if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset)
+            fail(name + " extends past the end of its buffer");
+        return {data.data() + view.byteOffset, view.byteLength};
+    }
 
     // Returns all components of all elements of accessor `index`. `type` is the required element type
     // (TINYGLTF_TYPE_…). Normalized integers become 0 to 1 or −1 to 1. `what` names the accessor in messages.
@@ -98,12 +108,10 @@ private:
 
     const unsigned char *bytes(int view_index, std::size_t offset, std::size_t length,
                                const std::string &name) const {
-        const tinygltf::BufferView &view = at(model_.bufferViews, view_index, "buffer view");
-        const auto &data = at(model_.buffers, view.buffer, "buffer").data;
-        if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset ||
-            offset > view.byteLength || length > view.byteLength - offset)
+        const std::span<const unsigned char> all = view(view_index, name);
+        if (offset > all.size() || length > all.size() - offset)
             fail(name + " extends past the end of its buffer");
-        return data.data() + view.byteOffset + offset;
+        return all.data() + offset;
     }
 
     template <class T>

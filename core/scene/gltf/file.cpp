@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/gltf/file.hpp"
 
+#include "scene/gltf/compression.hpp"
 #include "scene/mesh.hpp"
 #include "scene/mesh_file.hpp"
 #include "scene/referred_files.hpp"
@@ -96,8 +97,29 @@ std::string_view json_of(const MeshFile &text) {
     return json;
 }
 
-// Returns the JSON of the file; null if it is invalid, which tinygltf reports. Rejects files with which tinygltf
-// would read out of bounds or recurse without limit.
+// Returns the file with other JSON.
+std::string with_json(const MeshFile &text, const Json &replacement) {
+    std::string json = replacement.dump();
+    const std::string_view all = content_of(text);
+    if (!all.starts_with("glTF"))
+        return json;
+    constexpr std::size_t header = 12, chunk_header = 8;
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    const std::string_view rest = all.substr(header + chunk_header + json_of(text).size());
+    const std::size_t size = header + chunk_header + json.size() + rest.size();
+    if (size > file_limit - 1)
+        text.fail("is larger than 4 GiB");
+    const auto bytes = [](std::size_t number) { // little-endian
+        std::string result;
+        for (int shift = 0; shift < 32; shift += 8)
+            result += static_cast<char>(number >> shift);
+        return result;
+    };
+    return std::string(all.substr(0, 8)).append(bytes(size)).append(bytes(json.size())).append("JSON").append(json).append(rest);
+}
+
+// Returns the JSON of the file; null if it is invalid, which tinygltf reports. Rejects JSON with which tinygltf would
+// recurse without limit.
 Json checked_json(const MeshFile &text) {
     const auto check_depth = [&](int depth, Json::parse_event_t, Json &) {
         constexpr int max_depth = 64;
@@ -109,6 +131,18 @@ Json checked_json(const MeshFile &text) {
     Json root = Json::parse(json.begin(), json.end(), check_depth, false);
     if (!root.is_object())
         return {};
+    const Json asset = root.value("asset", Json());
+    const Json version = asset.is_object() ? asset.value("version", Json()) : Json();
+    if (!version.is_string() || !version.get<std::string>().starts_with("2."))
+        text.fail("is not glTF 2: its asset.version must be \"2.0\"");
+    if (const Json needed = asset.value("minVersion", Json("2.0")); needed != Json("2.0"))
+        text.fail("its asset.minVersion is " + printable(needed.dump()) +
+                  ", but arhost reads glTF 2.0; export it as glTF 2.0");
+    return root;
+}
+
+// Rejects files with which tinygltf would read out of bounds.
+void check_ranges(const MeshFile &text, const Json &root) {
     const auto list = [&](const char *key) {
         const auto found = root.find(key);
         return found != root.end() && found->is_array() ? *found : Json::array();
@@ -120,13 +154,6 @@ Json checked_json(const MeshFile &text) {
             text.fail("a value of '" + std::string(key) + "' is not an unsigned integer");
         return object[key].get<std::uint64_t>();
     };
-    const Json asset = root.value("asset", Json());
-    const Json version = asset.is_object() ? asset.value("version", Json()) : Json();
-    if (!version.is_string() || !version.get<std::string>().starts_with("2."))
-        text.fail("is not glTF 2: its asset.version must be \"2.0\"");
-    if (const Json needed = asset.value("minVersion", Json("2.0")); needed != Json("2.0"))
-        text.fail("its asset.minVersion is " + printable(needed.dump()) +
-                  ", but arhost reads glTF 2.0; export it as glTF 2.0");
     for (const Json &accessor : list("accessors"))
         number(accessor, "byteOffset");
     const Json buffers = list("buffers"), views = list("bufferViews");
@@ -137,7 +164,6 @@ Json checked_json(const MeshFile &text) {
         if (offset > all || size > all - offset)
             text.fail("buffer view " + std::to_string(i) + " extends past the end of its buffer");
     }
-    return root;
 }
 
 } // namespace
@@ -147,18 +173,26 @@ GltfFile read_gltf_file(const std::filesystem::path &file, std::span<const std::
     const MeshFile text = MeshFile::read(file, file_limit - 1, reporter);
     GltfFile result;
     result.json = checked_json(text);
+    std::string_view content = content_of(text);
+    std::string plain_content;
+    if (result.json.is_object()) {
+        const Json plain = plain_json(result.json, text.name());
+        check_ranges(text, plain);
+        if (plain != result.json)
+            content = plain_content = with_json(text, plain);
+    }
     tinygltf::TinyGLTF parser;
     parser.SetImageLoader(keep_image_bytes, nullptr);
     const std::string folder = file.parent_path().string();
     Resources resources{reporter, ReferredFiles(file, reads)};
     parser.SetFsCallbacks({is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, &resources});
     std::string error, warning;
-    const auto size = static_cast<unsigned int>(content_of(text).size());
+    const auto size = static_cast<unsigned int>(content.size());
     const bool good =
-        text.view().starts_with("glTF")
+        content.starts_with("glTF")
             ? parser.LoadBinaryFromMemory(&result.model, &error, &warning,
-                                          reinterpret_cast<const unsigned char *>(text.begin()), size, folder)
-            : parser.LoadASCIIFromString(&result.model, &error, &warning, text.begin(), size, folder);
+                                          reinterpret_cast<const unsigned char *>(content.data()), size, folder)
+            : parser.LoadASCIIFromString(&result.model, &error, &warning, content.data(), size, folder);
     const auto on_one_line = [](std::string lines) {
         while (!lines.empty() && lines.back() == '\n')
             lines.pop_back();
@@ -171,6 +205,7 @@ GltfFile read_gltf_file(const std::filesystem::path &file, std::span<const std::
         text.fail("cannot be loaded as glTF 2.0: " + on_one_line(error) + hint_at_uri(error));
     if (!warning.empty())
         reporter.info(text.name() + ": " + on_one_line(warning));
+    decompress(result, text.name());
     return result;
 }
 

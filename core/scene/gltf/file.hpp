@@ -16,7 +16,7 @@
 namespace arhost::scene {
 
 struct GltfFile {
-    tinygltf::Model model; // images are still encoded
+    tinygltf::Model model; // meshes are decompressed, images are still encoded
     nlohmann::json json;   // an object
 };
 

@@ -33,6 +33,9 @@ double invertible_scale(double scale) { // a scale of 0 hides objects, but has n
 // docs/scenes.md lists them.
 constexpr std::string_view supported_extensions[] = {
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -140,7 +143,8 @@ private:
         for (std::size_t i = 0; i < model_.extensionsRequired.size(); ++i)
             if (const std::string &extension = model_.extensionsRequired[i]; !is_supported(extension))
                 accessors_.fail("extensionsRequired[" + std::to_string(i) + "] requires the unsupported extension '" +
-                                printable(extension) + "'; export it without this extension");
+                                printable(extension) + "'; " +
+                                (extension == ktx2_extension ? ktx2_conversion : "export it without this extension"));
         if (!ignored.empty())
             reporter_.info(name_ + ": unsupported extensions are ignored: " + printable(ignored));
     }

@@ -23,6 +23,13 @@ std::optional<JsonNode> JsonNode::find(const char *key) const {
     return JsonNode(*found, path_.empty() ? key : path_ + "." + key, file_);
 }
 
+JsonNode JsonNode::at(const char *key) const {
+    const auto node = find(key);
+    if (!node)
+        fail("needs '" + std::string(key) + "'");
+    return *node;
+}
+
 std::vector<JsonNode> JsonNode::items() const {
     if (!value_->is_array())
         fail("must be an array");
@@ -30,6 +37,20 @@ std::vector<JsonNode> JsonNode::items() const {
     for (const nlohmann::json &item : *value_)
         items.emplace_back(item, path_ + "[" + std::to_string(items.size()) + "]", file_);
     return items;
+}
+
+std::vector<JsonNode> JsonNode::items(const char *key) const {
+    const auto node = find(key);
+    return node ? node->items() : std::vector<JsonNode>();
+}
+
+std::vector<std::pair<std::string, JsonNode>> JsonNode::members() const {
+    if (!value_->is_object())
+        fail("must be an object");
+    std::vector<std::pair<std::string, JsonNode>> members;
+    for (const auto &[key, value] : value_->items())
+        members.emplace_back(key, JsonNode(value, path_ + "." + key, file_));
+    return members;
 }
 
 std::optional<JsonNode> JsonNode::extension(const char *name) const {
@@ -60,6 +81,13 @@ int JsonNode::index() const {
     return value_->get<int>();
 }
 
+std::uint32_t JsonNode::integer(std::uint32_t low, std::uint32_t high) const {
+    const std::uint64_t value = value_->is_number_unsigned() ? value_->get<std::uint64_t>() : ~std::uint64_t(0);
+    if (value < low || value > high)
+        fail("must be a whole number from " + std::to_string(low) + " to " + std::to_string(high));
+    return static_cast<std::uint32_t>(value);
+}
+
 std::string JsonNode::text() const {
     if (!value_->is_string())
         fail("must be a string");
@@ -69,6 +97,12 @@ std::string JsonNode::text() const {
 float JsonNode::number_or(const char *key, float fallback, float low, float high) const {
     const auto node = find(key);
     return node ? node->number(low, high) : fallback;
+}
+
+std::uint32_t JsonNode::integer_or(const char *key, std::uint32_t fallback, std::uint32_t low,
+                                   std::uint32_t high) const {
+    const auto node = find(key);
+    return node ? node->integer(low, high) : fallback;
 }
 
 bool JsonNode::boolean_or(const char *key, bool fallback) const {

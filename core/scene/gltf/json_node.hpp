@@ -7,8 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace arhost::scene {
@@ -23,16 +25,21 @@ public:
     [[noreturn]] void fail(const std::string &message) const;
 
     std::optional<JsonNode> find(const char *key) const; // std::nullopt if this object has no such property
+    JsonNode at(const char *key) const;                  // throws MeshError if this object has no such property
     std::vector<JsonNode> items() const;                 // of an array
+    std::vector<JsonNode> items(const char *key) const;  // of an array; empty if this object has no such property
+    std::vector<std::pair<std::string, JsonNode>> members() const; // of an object
     std::optional<JsonNode> extension(const char *name) const;
 
     // Values beyond the range by at most 1e-3, such as 1.0000001, become its nearest end.
     float number(float low, float high) const;
     bool boolean() const;
     int index() const; // into a table of the file; not negative
+    std::uint32_t integer(std::uint32_t low, std::uint32_t high) const;
     std::string text() const;
 
     float number_or(const char *key, float fallback, float low, float high) const;
+    std::uint32_t integer_or(const char *key, std::uint32_t fallback, std::uint32_t low, std::uint32_t high) const;
     bool boolean_or(const char *key, bool fallback) const;
     std::string text_or(const char *key, const std::string &fallback) const;
     template <std::size_t count>

@@ -211,6 +211,10 @@ std::uint32_t GltfMaterials::texture_of(const JsonNode &parent, const char *key,
     if (!index)
         info->fail("needs the index of a texture");
     const tinygltf::Texture &texture = accessors_.at(content_.model.textures, index->index(), "texture");
+    const JsonNode texture_node(content_.json["textures"][static_cast<std::size_t>(index->index())],
+                                "textures[" + std::to_string(index->index()) + "]", name_);
+    if (texture.source < 0)
+        texture_node.fail(texture_node.extension(ktx2_extension) ? ktx2_conversion : "has no image");
     const tinygltf::Image &image = accessors_.at(content_.model.images, texture.source, "image");
     if (image.image.empty())
         info->fail("the image '" + printable(image.uri.substr(0, 100)) + "' cannot be read");

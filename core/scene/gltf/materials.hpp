@@ -13,6 +13,11 @@
 
 namespace arhost::scene {
 
+// arhost decodes no KTX2 images. Users can convert them with this command.
+inline constexpr const char *ktx2_extension = "KHR_texture_basisu";
+inline constexpr const char *ktx2_conversion =
+    "convert its KTX2 images to PNG with KTX-Software: npx @gltf-transform/cli ktxdecompress MODEL.glb PNG.glb";
+
 class GltfMaterials {
 public:
     // The arguments must outlive this object. `name`: of the file, for messages.

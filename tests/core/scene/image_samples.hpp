@@ -3,6 +3,7 @@
 // Encoders for small test images. Samples begin with the top row.
 #pragma once
 
+#include <webp/encode.h>
 #include <zlib.h>
 
 #include <cstdint>
@@ -52,6 +53,17 @@ inline std::string jpeg() {
     std::string bytes;
     for (const char *p = hex; *p; p += 2)
         bytes += static_cast<char>(std::stoi(std::string(p, 2), nullptr, 16));
+    return bytes;
+}
+
+// `samples`: RGBA. `quality`: 0 to 100, or −1 for lossless.
+inline std::string webp(int width, int height, const std::string &samples, float quality = -1) {
+    const auto *from = reinterpret_cast<const std::uint8_t *>(samples.data());
+    std::uint8_t *to = nullptr;
+    const std::size_t size = quality < 0 ? WebPEncodeLosslessRGBA(from, width, height, 4 * width, &to)
+                                         : WebPEncodeRGBA(from, width, height, 4 * width, quality, &to);
+    const std::string bytes(reinterpret_cast<const char *>(to), size);
+    WebPFree(to);
     return bytes;
 }
 

@@ -2,6 +2,7 @@
 #include "errors.hpp"
 #include "image_samples.hpp"
 #include "plugin_under_test.hpp"
+#include "scene/image.hpp"
 #include "scene/scene_loader.hpp"
 #include "scene_samples.hpp"
 
@@ -81,6 +82,35 @@ TEST(Textures, AreExpandedToRgba) {
     EXPECT_EQ(grey_jpeg[255], 255);
 }
 
+TEST(Textures, AreReadFromWebp) {
+    const std::string samples = {10, 20, 30, 40, 50, 60, 70, 80};
+    const Arena lossless = Scene("a.webp", webp(1, 2, samples)).load_texture("a.webp");
+    EXPECT_EQ(image(lossless).height, 2u);
+    EXPECT_THAT(bytes(lossless), ElementsAre(10, 20, 30, 40, 50, 60, 70, 80));
+    const std::vector<int> lossy = bytes(Scene("a.webp", webp(1, 2, samples, 100)).load_texture("a.webp"));
+    ASSERT_EQ(lossy.size(), 8u);
+    EXPECT_NEAR(lossy[0], 10, 12);
+    EXPECT_EQ(lossy[3], 40) << "alpha is lossless";
+    EXPECT_EQ(lossy[7], 80);
+}
+
+TEST(Textures, HaveAMemoryLimit) {
+    ImageBudget budget(100);
+    const LoadCallbacks callbacks;
+    const auto read = [&](const std::string &image) {
+        return arhost::test::error_of<ImageError>([&] {
+            read_image("a.png", {reinterpret_cast<const unsigned char *>(image.data()), image.size()},
+                       Reporter(callbacks, "a.png"), budget);
+        });
+    };
+    EXPECT_EQ(read(png(20, 1, 3, "")), "no error");
+    EXPECT_EQ(read(png(6, 1, 3, "")), "a.png: the decoded images of a scene may have at most 0 MiB together, and this one "
+                                      "exceeds it by 1 MiB; scale some of them down");
+    EXPECT_THAT(read(png(6, 1, 3, "").substr(0, 45)), HasSubstr("exceeds it by 1 MiB")) << "before it is decoded";
+    EXPECT_THAT(read(webp(6, 1, std::string(24, '\1'))), HasSubstr("exceeds it by 1 MiB"));
+    EXPECT_EQ(read(png(5, 1, 3, "")), "no error");
+}
+
 TEST(Textures, FloatsAreLinearAndClamped) {
     const Arena radiance = Scene("a.hdr", hdr(1, 2, {'\x80', 64, 32, '\x81', 1, 2, 4, '\x88'})).load_texture("a.hdr");
     EXPECT_EQ(image(radiance).format, ARHOST_TEXEL_RGBA32F);
@@ -129,8 +159,8 @@ TEST(Textures, ErrorsNameFileAndKey) {
         return Scene(name, content)
             .error_of("materials:\n  a: {model: diffuse, texture: " + name + "}\nobjects: []\n");
     };
-    EXPECT_EQ(error("a.png", "GIF89a"), "s.yaml:4:32: materials.a.texture: a.png: is not a PNG, JPEG, PPM, HDR or "
-                                        "EXR image; convert it to one of these formats");
+    EXPECT_EQ(error("a.png", "GIF89a"), "s.yaml:4:32: materials.a.texture: a.png: is not a PNG, JPEG, WebP, PPM, HDR "
+                                        "or EXR image; convert it to one of these formats");
     EXPECT_EQ(error("a.png", ""), "s.yaml:4:32: materials.a.texture: a.png: is empty");
     EXPECT_THAT(error("a.png", png(2, 2, 3, "").substr(0, 40)), HasSubstr("a.png: cannot be loaded: "));
     EXPECT_THAT(error("a.jpg", jpeg().substr(0, 60)), HasSubstr("a.jpg: cannot be loaded: "));
@@ -141,6 +171,13 @@ TEST(Textures, ErrorsNameFileAndKey) {
               "s.yaml:4:32: materials.a.texture: b.png: cannot be read: No such file or directory");
     EXPECT_THAT(Scene("a.png", "").error_of("materials:\n  a: {model: diffuse, texture: .}\nobjects: []\n"),
                 HasSubstr("is not a regular file"));
+    EXPECT_THAT(error("a.webp", webp(1, 1, {1, 2, 3, 4}).substr(0, 20)), HasSubstr("a.webp: cannot be loaded: "));
+    std::string noise;
+    for (int i = 0; i < 400; ++i)
+        noise += static_cast<char>(i * i * 37);
+    EXPECT_THAT(error("a.webp", webp(10, 10, noise).substr(0, 100)), HasSubstr("a.webp: cannot be loaded: "));
+    const std::string animated("RIFF\x16\0\0\0WEBPVP8X\x0a\0\0\0\2\0\0\0\0\0\0\0\0\0", 30);
+    EXPECT_THAT(error("a.webp", animated), HasSubstr("a.webp: is an animated WebP image, which cannot be a texture"));
     EXPECT_THAT(Scene("a.png", "").error_of("materials:\n  a: {model: mirror, texture: a.png}\nobjects: []\n"),
                 HasSubstr("materials.a.texture: unknown key"));
     EXPECT_THAT(Scene("a.png", "")
