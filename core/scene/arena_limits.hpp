@@ -16,8 +16,8 @@ inline constexpr std::uint32_t max_depth_limit = 100;
 inline constexpr std::uint32_t texture_side_limit = 16384;
 inline constexpr float film_thickness_limit_nm = 1e5f;
 inline constexpr std::uint64_t image_bytes_limit = std::uint64_t(8) << 30; // of all images of a scene
-inline constexpr float radiance_limit = 1e6f;   // for texels and emission
-inline constexpr float extinction_limit = 1e6f; // 1/mm
+inline constexpr float radiance_limit = 1e6f;                              // for texels and emission
+inline constexpr float extinction_limit = 1e6f;                            // 1/mm
 inline constexpr float duration_limit_s = 1e6f; // at this time, floats have a resolution of 1/16 s
 
 } // namespace arhost::scene

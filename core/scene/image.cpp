@@ -130,11 +130,13 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
     const std::string name = file.string();
     if (content.empty())
         reporter.reads(file);
-    const char *format = format_of(
-        content.empty() ? start_of(file)
-                        : std::string(content.begin(), content.begin() + std::min<std::size_t>(start_size, content.size())));
+    const char *format =
+        format_of(content.empty() ? start_of(file)
+                                  : std::string(content.begin(),
+                                                content.begin() + std::min<std::size_t>(start_size, content.size())));
     if (!format)
-        throw ImageError(name + ": is not a PNG, JPEG, WebP, PPM, HDR or EXR image; convert it to one of these formats");
+        throw ImageError(name +
+                         ": is not a PNG, JPEG, WebP, PPM, HDR or EXR image; convert it to one of these formats");
     Image image;
     std::exception_ptr stopped; // exceptions must not propagate through OpenImageIO
     ImageRequest request{format, name, content, {}, {}};

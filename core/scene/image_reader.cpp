@@ -49,7 +49,8 @@ std::string read_webp(const ImageRequest &request) {
         return "is an animated WebP image, which cannot be a texture";
     if (const std::string error = size_error(features.width, features.height); !error.empty())
         return error;
-    const auto width = static_cast<std::uint32_t>(features.width), height = static_cast<std::uint32_t>(features.height);
+    const auto width = static_cast<std::uint32_t>(features.width),
+               height = static_cast<std::uint32_t>(features.height);
     std::byte *texels = request.allocate(width, height, false);
     if (!WebPDecodeRGBAInto(content.data(), content.size(), reinterpret_cast<std::uint8_t *>(texels),
                             std::size_t(4) * width * height, features.width * 4))

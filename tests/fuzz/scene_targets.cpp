@@ -6,6 +6,7 @@
 #include "targets.hpp"
 
 #include "scene/gltf/gltf.hpp"
+#include "scene/image.hpp"
 #include "scene/mesh_loader.hpp"
 #include "scene/motion.hpp"
 #include "scene/scene_loader.hpp"
@@ -103,6 +104,69 @@ void run_gltf(Bytes bytes) {
         }
         check(std::move(builder));
     } catch (const MeshError &) {
+    } catch (const ImageError &) {
+    }
+}
+
+namespace {
+
+// Loads a .glb whose binary chunk is `bytes`.
+void load_glb(const std::string &json, Bytes bytes) {
+    const auto number = [](std::size_t value) {
+        const auto v = static_cast<std::uint32_t>(value);
+        return std::string(reinterpret_cast<const char *>(&v), sizeof v);
+    };
+    const std::string chunk = json + std::string(3 - (json.size() + 3) % 4, ' ');
+    const std::string file = "glTF" + number(2) + number(28 + chunk.size() + bytes.size()) + number(chunk.size()) +
+                             "JSON" + chunk + number(bytes.size()) + std::string("BIN\0", 4) +
+                             std::string(bytes.begin(), bytes.end());
+    run_gltf({reinterpret_cast<const std::uint8_t *>(file.data()), file.size()});
+}
+
+} // namespace
+
+void run_draco(Bytes bytes) {
+    const std::string size = std::to_string(bytes.size());
+    load_glb(
+        R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "buffers": [{"byteLength": )" + size +
+            R"(}], "bufferViews": [{"buffer": 0, "byteLength": )" + size +
+            R"(}], "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3"}], "meshes": [{"primitives": [{
+                 "attributes": {"POSITION": 0, "COLOR_0": 0}, "extensions": {"KHR_draco_mesh_compression": {
+                 "bufferView": 0, "attributes": {"POSITION": 0, "COLOR_0": 1}}}}]}]})",
+        bytes);
+}
+
+void run_meshopt(Bytes bytes) {
+    Input input(bytes);
+    constexpr const char *modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES"},
+                         *filters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"};
+    const std::string mode = modes[input.number() % 3], filter = filters[input.number() % 4],
+                      stride = std::to_string(input.number()), count = std::to_string(input.number<std::uint16_t>());
+    const Bytes rest = input.take(bytes.size());
+    const std::string size = std::to_string(rest.size());
+    load_glb(R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "buffers": [{"byteLength": )" + size +
+                 R"(}], "bufferViews": [{"buffer": 0, "byteLength": )" +
+                 std::to_string(std::stoul(stride) * std::stoul(count)) +
+                 R"(, "extensions": {"EXT_meshopt_compression": {"buffer": 0, "byteLength": )" + size +
+                 R"(, "mode": ")" + mode + R"(", "filter": ")" + filter + R"(", "byteStride": )" + stride +
+                 R"(, "count": )" + count +
+                 R"(}}}], "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+                 "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]})",
+             rest);
+}
+
+void run_webp(Bytes bytes) {
+    if (bytes.empty()) // read_image would read a file
+        return;
+    const std::string start("RIFF\0\0\0\0WEBP", 12);
+    std::vector<unsigned char> content(bytes.begin(), bytes.end());
+    content.resize(std::max(content.size(), start.size()));
+    std::copy_n(start.begin(), 4, content.begin()); // no other decoder
+    std::copy_n(start.begin() + 8, 4, content.begin() + 8);
+    const LoadCallbacks callbacks;
+    ImageBudget budget(arena_size_limit);
+    try {
+        read_image("image.webp", content, Reporter(callbacks, "image.webp"), budget);
     } catch (const ImageError &) {
     }
 }

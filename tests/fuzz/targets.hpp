@@ -32,7 +32,10 @@ void run_obj(Bytes);
 void run_mtl(Bytes);
 void run_ply(Bytes);
 void run_stl(Bytes);
-void run_gltf(Bytes);            // including .glb
+void run_gltf(Bytes);    // including .glb
+void run_draco(Bytes);   // the compressed mesh in a glTF file
+void run_meshopt(Bytes); // mode, filter, stride and count of a compressed buffer view, then its bytes
+void run_webp(Bytes);
 void run_arena(Bytes);           // the output of the scene loader process
 void run_ring(Bytes);            // shared memory that a worker writes
 void run_host(Bytes);            // the whole host with misbehaving workers
@@ -56,6 +59,9 @@ inline constexpr Target targets[] = {
     {"ply", run_ply, 15000},
     {"stl", run_stl, 15000},
     {"gltf", run_gltf, 8000},
+    {"draco", run_draco, 4000},
+    {"meshopt", run_meshopt, 4000},
+    {"webp", run_webp, 8000},
     {"arena", run_arena, 20000},
     {"ring", run_ring, 20000},
     {"host", run_host, 1000},

@@ -68,7 +68,8 @@ nlohmann::json plain_json(const nlohmann::json &json, const std::string &name) {
                                 images = root.items("images"), textures = root.items("textures"),
                                 meshes = root.items("meshes");
     for (std::size_t i = 0; i < buffers.size(); ++i)
-        if (const auto extension = buffers[i].extension(meshopt_extension); extension && extension->boolean_or("fallback", false))
+        if (const auto extension = buffers[i].extension(meshopt_extension);
+            extension && extension->boolean_or("fallback", false))
             plain["buffers"][i] = {{"byteLength", 1u}, {"uri", "data:application/octet-stream;base64,AA=="}};
     for (std::size_t i = 0; i < views.size(); ++i)
         if (const auto extension = views[i].extension(meshopt_extension))

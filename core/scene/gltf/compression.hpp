@@ -23,9 +23,9 @@ private:
     std::uint64_t limit_, left_;
 };
 
-// Returns the JSON of a file as tinygltf can load it: compressed buffer views have their compressed bytes, buffers for
-// readers without decoders are empty, textures have the image that arhost prefers, and the primitives of Draco have
-// no indices yet. Throws MeshError. `name`: of the file.
+// Returns the JSON of a file as tinygltf can load it: compressed buffer views have their compressed bytes, buffers
+// for readers without decoders are empty, textures have the image that arhost prefers, and the primitives of Draco
+// have no indices yet. Throws MeshError. `name`: of the file.
 nlohmann::json plain_json(const nlohmann::json &json, const std::string &name);
 
 // Decodes all compressed buffer views and primitives of a file that was loaded with plain_json(file.json). Throws

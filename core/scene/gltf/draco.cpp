@@ -110,8 +110,9 @@ DracoMesh::Attribute DracoMesh::attribute(std::uint32_t id, const JsonNode &node
     for (std::uint32_t vertex = 0; vertex < vertex_count(); ++vertex) {
         const bool is_mapped = attribute->is_mapping_identity() || vertex < attribute->indices_map_size();
         const auto offset =
-            is_mapped ? static_cast<std::size_t>(attribute->GetBytePos(attribute->mapped_index(draco::PointIndex(vertex))))
-                      : values.data_size();
+            is_mapped
+                ? static_cast<std::size_t>(attribute->GetBytePos(attribute->mapped_index(draco::PointIndex(vertex))))
+                : values.data_size();
         if (offset + size > values.data_size())
             node.fail("has no value for vertex " + std::to_string(vertex));
         std::memcpy(&result.values[vertex * size], values.data() + offset, size);

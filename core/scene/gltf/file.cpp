@@ -115,7 +115,12 @@ std::string with_json(const MeshFile &text, const Json &replacement) {
             result += static_cast<char>(number >> shift);
         return result;
     };
-    return std::string(all.substr(0, 8)).append(bytes(size)).append(bytes(json.size())).append("JSON").append(json).append(rest);
+    return std::string(all.substr(0, 8))
+        .append(bytes(size))
+        .append(bytes(json.size()))
+        .append("JSON")
+        .append(json)
+        .append(rest);
 }
 
 // Returns the JSON of the file; null if it is invalid, which tinygltf reports. Rejects JSON with which tinygltf would

@@ -32,8 +32,9 @@ inline std::string base64(const std::string &bytes) {
 // Builds a glTF file with one buffer.
 struct Gltf {
     std::string bytes, views, accessors; // content of the JSON lists, without brackets
-    std::string meshes, nodes = R"({"mesh": 0})", scene_nodes = "0",
-                        more, more_buffers; // further JSON members, and further entries of "buffers"; each starts with a comma
+    std::string meshes,
+        nodes = R"({"mesh": 0})", scene_nodes = "0", more,
+        more_buffers; // further JSON members, and further entries of "buffers"; each starts with a comma
     int view_count = 0, accessor_count = 0;
 
     int view(const std::string &data, int stride = 0) {
@@ -93,7 +94,7 @@ struct Loaded {
 };
 
 inline Loaded load(const std::string &gltf, const std::string &object = "", const std::string &axes = "y-up",
-            const std::string &name = "a.gltf") {
+                   const std::string &name = "a.gltf") {
     const arhost::test::ScratchFolder folder;
     write_file(folder.path() / name, gltf);
     write_file(folder.path() / "s.yaml", "version: 1\naxes: " + axes +

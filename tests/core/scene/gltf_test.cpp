@@ -748,7 +748,7 @@ TEST(Gltf, ErrorsNameTheProblem) {
     std::string newer = triangle().text();
     replace(newer, "\"version\": \"2.0\"", "\"version\": \"2.1\", \"minVersion\": \"2.1\"");
     EXPECT_THAT(error_of(newer), HasSubstr("its asset.minVersion is \"2.1\", but arhost reads glTF 2.0"));
-    for (const std::string extension : {"KHR_materials_sheen", "KHR_texture_basisu"})
+    for (const std::string extension : {"KHR_materials_dispersion", "KHR_texture_basisu"})
         EXPECT_THAT(error_after([&](Gltf &g) {
                         g.more += R"(, "extensionsRequired": ["KHR_mesh_quantization", ")" + extension + "\"]";
                     }),

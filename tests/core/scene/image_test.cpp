@@ -104,8 +104,9 @@ TEST(Textures, HaveAMemoryLimit) {
         });
     };
     EXPECT_EQ(read(png(20, 1, 3, "")), "no error");
-    EXPECT_EQ(read(png(6, 1, 3, "")), "a.png: the decoded images of a scene may have at most 0 MiB together, and this one "
-                                      "exceeds it by 1 MiB; scale some of them down");
+    EXPECT_EQ(read(png(6, 1, 3, "")),
+              "a.png: the decoded images of a scene may have at most 0 MiB together, and this one "
+              "exceeds it by 1 MiB; scale some of them down");
     EXPECT_THAT(read(png(6, 1, 3, "").substr(0, 45)), HasSubstr("exceeds it by 1 MiB")) << "before it is decoded";
     EXPECT_THAT(read(webp(6, 1, std::string(24, '\1'))), HasSubstr("exceeds it by 1 MiB"));
     EXPECT_EQ(read(png(5, 1, 3, "")), "no error");

@@ -271,7 +271,8 @@ TEST(Mtl, ErrorsNameFileAndLine) {
         {"newmtl m\nbump -bm x.png\n", "a.mtl:2: 'x.png' is not a number"},
         {"newmtl m\nmap_Kd C:\\x y.png\n",
          "a.mtl:2: map_Kd: 'C:/x y.png' does not exist; write a path relative to this file"},
-        {"newmtl m\nmap_Kd a.mtl\n", HasSubstr("a.mtl:2: map_Kd: a.mtl: is not a PNG, JPEG, WebP, PPM, HDR or EXR image")},
+        {"newmtl m\nmap_Kd a.mtl\n",
+         HasSubstr("a.mtl:2: map_Kd: a.mtl: is not a PNG, JPEG, WebP, PPM, HDR or EXR image")},
         {"newmtl n\n", "a.obj:8: no MTL file defines the material 'm'; define it, or add the key 'material' to the "
                        "object"},
     };
