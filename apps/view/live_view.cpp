@@ -2,8 +2,8 @@
 #include "view/live_view.hpp"
 
 #include "view/interruption.hpp"
-
 #include "view/picture.hpp"
+
 #include <arhost-cpp/linear_pixel.hpp>
 
 #include <chrono>

@@ -104,11 +104,11 @@ void decompress(GltfFile &file, const std::string &name) {
     const std::vector<JsonNode> views = root.items("bufferViews"), meshes = root.items("meshes");
     for (std::size_t i = 0; i < views.size(); ++i)
         if (const auto extension = views[i].extension(meshopt_extension)) {
-            tinygltf::BufferView &view = model.bufferViews[i];
             std::vector<unsigned char> bytes =
                 decode_meshopt(accessors.view(static_cast<int>(i), meshopt_extension), *extension, budget);
             if (views[i].at("byteLength").integer(0, size_limit) != bytes.size())
                 views[i].at("byteLength").fail("must be count * byteStride of " + std::string(meshopt_extension));
+            tinygltf::BufferView &view = model.bufferViews[i];
             view.buffer = static_cast<int>(model.buffers.size());
             view.byteOffset = 0;
             view.byteLength = bytes.size();
