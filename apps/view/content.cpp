@@ -74,7 +74,8 @@ Loader::Loader(Options options)
     check_reads(path, node);
     is_gltf_ = extension == ".gltf" || extension == ".glb";
     is_model_ = extension != ".yaml" && extension != ".yml";
-    options_.is_z_up |= extension == ".stl"; // most programs that write STL files are for 3D printing or CAD
+    if (!options_.is_z_up) // most programs that write STL files are for 3D printing or CAD
+        options_.is_z_up = extension == ".stl";
     if (!is_model_ && !options_.environment.empty())
         throw InvalidInput("--environment: a scene file has its own light; add the key 'environment' to it");
 }
@@ -88,7 +89,7 @@ std::string Loader::scene_text(const Selection &selection, bool has_material) co
     if (!selection.variant.empty())
         object["variant"] = selection.variant;
     json scene = {
-        {"version", 2}, {"axes", options_.is_z_up && !is_gltf_ ? "z-up" : "y-up"}, {"materials", json::object()}};
+        {"version", 2}, {"axes", *options_.is_z_up && !is_gltf_ ? "z-up" : "y-up"}, {"materials", json::object()}};
     if (has_material) {
         object["material"] = "plain";
         scene["materials"]["plain"] = {

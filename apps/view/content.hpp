@@ -12,6 +12,7 @@
 #include <arhost/scene.h>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,7 @@ public:
         std::filesystem::path file;        // .yaml: a scene; else a model
         std::filesystem::path environment; // image that lights a model; empty: the default light
         std::filesystem::path output;      // must not be a file that the scene reads; may be empty
-        bool is_z_up = false;              // whether z is up in an OBJ or PLY file
+        std::optional<bool> is_z_up{};     // whether z is up in an OBJ, PLY or STL file; absent: only in STL files
     };
     // Throws base::InvalidInput if the file is not one that can be viewed.
     explicit Loader(Options options);

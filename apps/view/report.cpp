@@ -174,7 +174,7 @@ std::string to_text(const Report &report, const arhost_scene &scene, const scene
     lines.add_all("animations", contents.animations, [&](std::size_t i) {
         const auto &[name, duration_s] = contents.animations[i];
         const bool is_shown = report.animation == name || report.animation == std::to_string(i) ||
-                              (report.animation == "all" && !name.empty());
+                              report.animation == "all";
         return fmt::format("{} {}, {:.4g} s{}", i, name_or(name, "(no name)"), duration_s, is_shown ? ", shown" : "");
     });
     lines.add_all("variants", contents.variants,

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -56,7 +55,7 @@ private:
 } // namespace
 
 void add_levels(TexelImage &image) {
-    const auto count = static_cast<std::uint32_t>(std::bit_width(std::max(image.width, image.height)));
+    const std::uint32_t count = levels_of(image);
     const Codec codec(image.format);
     const std::size_t size = codec.texel_size();
     Texels all = Texels::of_size(texel_count(image.width, image.height, count) * size);

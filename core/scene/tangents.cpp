@@ -26,7 +26,9 @@ std::vector<std::uint32_t> identities_of(const TriangleMesh &mesh, const glm::ve
     identities.reserve(mesh.positions.size());
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         const glm::vec3 &p = mesh.positions[i], &n = mesh.normals[i];
-        const Key key{p.x, p.y, p.z, n.x, n.y, n.z, texcoords[i].x, texcoords[i].y};
+        Key key{p.x, p.y, p.z, n.x, n.y, n.z, texcoords[i].x, texcoords[i].y};
+        for (float &number : key)
+            number += 0.f; // −0 becomes 0
         identities.push_back(known.try_emplace(key, static_cast<std::uint32_t>(known.size())).first->second);
     }
     return identities;

@@ -32,6 +32,10 @@ std::uint32_t Textures::add(const std::string &name, const char *kind, const Tex
     const auto [image, is_new] = images_.try_emplace(name + "\n" + kind);
     if (is_new) {
         TexelImage made = make(image_callbacks());
+        const std::uint64_t size = made.texels.size;
+        budget_.take((texel_count(made.width, made.height, levels_of(made)) - texel_count(made.width, made.height, 1)) *
+                         (size / texel_count(made.width, made.height, 1)),
+                     printable(name));
         add_levels(made);
         image->second = builder_.add_image(printable(name), std::move(made));
     }

@@ -88,21 +88,23 @@ void run_mtl(Bytes bytes) {
 void run_gltf(Bytes bytes) {
     const bool binary = bytes.size() > 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
     try {
-        ArenaBuilder builder;
-        const LoadCallbacks callbacks;
-        Textures textures(builder, callbacks);
         GltfPlacement placement;
         placement.name = "gltf";
         placement.animations = {"all"};
         const auto file = write_scratch(binary ? "model.glb" : "model.gltf", bytes);
-        try {
+        const auto load = [&] {
+            ArenaBuilder builder;
+            const LoadCallbacks callbacks;
+            Textures textures(builder, callbacks);
             builder.settings.duration_s = add_gltf(builder, textures, file, placement, callbacks);
+            check(std::move(builder));
+        };
+        try {
+            load();
         } catch (const AnimationError &) {
             placement.animations.clear();
-            builder = ArenaBuilder();
-            add_gltf(builder, textures, file, placement, callbacks);
+            load();
         }
-        check(std::move(builder));
     } catch (const MeshError &) {
     } catch (const ImageError &) {
     }

@@ -35,6 +35,7 @@ void decode_primitive(tinygltf::Model &model, tinygltf::Primitive &primitive, co
         const auto attribute = primitive.attributes.find(name);
         if (attribute == primitive.attributes.end())
             id.fail("is not an attribute of the primitive");
+        budget.take(mesh.vertex_count() * sizeof(float[4]), id); // several names may have the same data
         DracoMesh::Attribute decoded = mesh.attribute(id.integer(0, size_limit), id);
         tinygltf::Accessor accessor;
         accessor.componentType = decoded.component_type;

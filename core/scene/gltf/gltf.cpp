@@ -731,20 +731,23 @@ private:
         });
     }
 
-    // Returns the set of texture coordinates along which a material needs tangents; std::nullopt if it needs none. A
-    // texture that is turned or mirrored needs other tangents, which ray tracers compute for each triangle.
+    // Returns the set of texture coordinates along which a material needs tangents; std::nullopt if it needs none.
+    // Textures that are turned or mirrored, or use several sets, need other tangents, which ray tracers compute for
+    // each triangle.
     std::optional<std::uint32_t> normal_texcoord_set_of(std::uint32_t material) const {
         const arhost_material &of = builder_.material(material);
+        std::optional<std::uint32_t> set;
         for (const std::uint32_t texture :
              {of.normal_texture, of.anisotropy > 0 ? of.anisotropy_texture : ARHOST_NONE,
               of.clearcoat_normal_texture})
             if (texture != ARHOST_NONE) {
                 const glm::mat3x2 &m = builder_.texture(texture).image_from_texcoord;
-                if (m[0].x > 0 && m[1].y > 0 && m[0].y == 0 && m[1].x == 0)
-                    return builder_.texture(texture).texcoord_set;
-                return std::nullopt;
+                const std::uint32_t own = builder_.texture(texture).texcoord_set;
+                if (m[0].x <= 0 || m[1].y <= 0 || m[0].y != 0 || m[1].x != 0 || own != set.value_or(own))
+                    return std::nullopt;
+                set = own;
             }
-        return of.anisotropy > 0 ? std::optional(0u) : std::nullopt;
+        return set || of.anisotropy == 0 ? set : std::optional(0u);
     }
 
     void complete_tangents(TriangleMesh &mesh, std::uint32_t material) const {

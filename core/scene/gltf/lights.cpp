@@ -48,8 +48,8 @@ arhost_light GltfLights::at(const JsonNode &reference, const glm::dmat4 &world_f
     constexpr float quarter_turn = std::numbers::pi_v<float> / 2;
     const float outer = spot.number_or("outerConeAngle", std::numbers::pi_v<float> / 4, 0, quarter_turn),
                 inner = spot.number_or("innerConeAngle", 0, 0, quarter_turn);
-    if (inner >= outer)
-        spot.find("innerConeAngle").value_or(spot).fail("must be less than outerConeAngle");
+    if (inner > outer)
+        spot.find("innerConeAngle").value_or(spot).fail("must not exceed outerConeAngle");
     light.cosine_inner = std::cos(inner);
     light.cosine_outer = std::cos(outer);
     return light;

@@ -405,7 +405,7 @@ TEST(Gltf, ReadsLights) {
     EXPECT_THAT(error_of(with("")),
                 HasSubstr("nodes[1].extensions.KHR_lights_punctual.light: the file has only 0 lights"));
     EXPECT_THAT(error_of(with(R"({"type": "spot", "spot": {"innerConeAngle": 1}})")),
-                HasSubstr("innerConeAngle: must be less than outerConeAngle"));
+                HasSubstr("innerConeAngle: must not exceed outerConeAngle"));
 }
 
 TEST(Gltf, ReadsThinWallsAndVolumes) {
