@@ -168,9 +168,9 @@ void view(const Arguments &arguments) {
     std::optional<Display> display;
     if (kind == Output::window && !arguments.info)
         display.emplace();
-    Loader loader({arguments.file, arguments.environment, arguments.output,
-                   arguments.up ? std::optional(std::abs((*arguments.up)[2]) > std::abs((*arguments.up)[1]))
-                                : std::nullopt});
+    Loader loader(
+        {arguments.file, arguments.environment, arguments.output,
+         arguments.up ? std::optional(std::abs((*arguments.up)[2]) > std::abs((*arguments.up)[1])) : std::nullopt});
     Selection selection{"", arguments.variant};
     Content content = loader.load(selection);
     if (arguments.animation.empty())

@@ -173,8 +173,8 @@ std::string to_text(const Report &report, const arhost_scene &scene, const scene
         lines.add("box", box_text(report.over_animation) + ", over the animation");
     lines.add_all("animations", contents.animations, [&](std::size_t i) {
         const auto &[name, duration_s] = contents.animations[i];
-        const bool is_shown = report.animation == name || report.animation == std::to_string(i) ||
-                              report.animation == "all";
+        const bool is_shown =
+            report.animation == name || report.animation == std::to_string(i) || report.animation == "all";
         return fmt::format("{} {}, {:.4g} s{}", i, name_or(name, "(no name)"), duration_s, is_shown ? ", shown" : "");
     });
     lines.add_all("variants", contents.variants,

@@ -47,7 +47,7 @@ std::string read_webp(const ImageRequest &request) {
         return "cannot be loaded: it is not a WebP image, or is truncated";
     if (features.has_animation)
         return "is an animated WebP image, which cannot be a texture";
-    if (const std::string error = size_error(features.width, features.height); !error.empty())
+    if (std::string error = size_error(features.width, features.height); !error.empty())
         return error;
     const auto width = static_cast<std::uint32_t>(features.width),
                height = static_cast<std::uint32_t>(features.height);
@@ -75,7 +75,7 @@ std::string read(const ImageRequest &request) {
         return "cannot be loaded: " + input->geterror();
     if (spec.deep || spec.depth > 1 || spec.nchannels < 1)
         return "is a deep or volume image, which cannot be a texture";
-    if (const std::string error = size_error(spec.width, spec.height); !error.empty())
+    if (std::string error = size_error(spec.width, spec.height); !error.empty())
         return error;
     const bool is_float = spec.format.is_floating_point();
     // The image is grey, grey with alpha, RGB, or RGBA. Additional channels of EXR files are ignored.

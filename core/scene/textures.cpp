@@ -33,9 +33,10 @@ std::uint32_t Textures::add(const std::string &name, const char *kind, const Tex
     if (is_new) {
         TexelImage made = make(image_callbacks());
         const std::uint64_t size = made.texels.size;
-        budget_.take((texel_count(made.width, made.height, levels_of(made)) - texel_count(made.width, made.height, 1)) *
-                         (size / texel_count(made.width, made.height, 1)),
-                     printable(name));
+        budget_.take(
+            (texel_count(made.width, made.height, levels_of(made)) - texel_count(made.width, made.height, 1)) *
+                (size / texel_count(made.width, made.height, 1)),
+            printable(name));
         add_levels(made);
         image->second = builder_.add_image(printable(name), std::move(made));
     }

@@ -94,7 +94,7 @@ nlohmann::json plain_json(const nlohmann::json &json, const std::string &name) {
     return plain;
 }
 
-void decompress(GltfFile &file, const std::string &name) {
+void decompress(GltfFile &file, const std::string &name, const Reporter &reporter) {
     tinygltf::Model &model = file.model;
     const Accessors accessors(model, name);
     const JsonNode root(file.json, "", name);
@@ -105,6 +105,7 @@ void decompress(GltfFile &file, const std::string &name) {
     const std::vector<JsonNode> views = root.items("bufferViews"), meshes = root.items("meshes");
     for (std::size_t i = 0; i < views.size(); ++i)
         if (const auto extension = views[i].extension(meshopt_extension)) {
+            reporter.report(-1);
             std::vector<unsigned char> bytes =
                 decode_meshopt(accessors.view(static_cast<int>(i), meshopt_extension), *extension, budget);
             if (views[i].at("byteLength").integer(0, size_limit) != bytes.size())
@@ -122,6 +123,7 @@ void decompress(GltfFile &file, const std::string &name) {
             if (const auto extension = primitives[k].extension(draco_extension)) {
                 if (primitives.size() != model.meshes[i].primitives.size()) // tinygltf skips such primitives
                     meshes[i].fail("has a primitive without attributes");
+                reporter.report(-1);
                 decode_primitive(model, model.meshes[i].primitives[k], *extension, accessors, budget);
             }
     }

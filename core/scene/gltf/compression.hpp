@@ -30,6 +30,6 @@ nlohmann::json plain_json(const nlohmann::json &json, const std::string &name);
 
 // Decodes all compressed buffer views and primitives of a file that was loaded with plain_json(file.json). Throws
 // MeshError.
-void decompress(GltfFile &file, const std::string &name);
+void decompress(GltfFile &file, const std::string &name, const Reporter &reporter);
 
 } // namespace arhost::scene

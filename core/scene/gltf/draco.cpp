@@ -104,7 +104,8 @@ DracoMesh::Attribute DracoMesh::attribute(std::uint32_t id, const JsonNode &node
     const int width = attribute->num_components(), component_type = component_type_of(attribute->data_type());
     if (width < 1 || width > 4 || component_type == 0)
         node.fail("has a type that glTF does not support");
-    const auto size = static_cast<std::size_t>(width * draco::DataTypeLength(attribute->data_type()));
+    const auto size =
+        static_cast<std::size_t>(width) * static_cast<std::size_t>(draco::DataTypeLength(attribute->data_type()));
     Attribute result{component_type, types[width - 1], std::vector<unsigned char>(vertex_count() * size)};
     const draco::DataBuffer &values = *attribute->buffer();
     for (std::uint32_t vertex = 0; vertex < vertex_count(); ++vertex) {

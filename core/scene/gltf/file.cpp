@@ -210,7 +210,7 @@ GltfFile read_gltf_file(const std::filesystem::path &file, std::span<const std::
         text.fail("cannot be loaded as glTF 2.0: " + on_one_line(error) + hint_at_uri(error));
     if (!warning.empty())
         reporter.info(text.name() + ": " + on_one_line(warning));
-    decompress(result, text.name());
+    decompress(result, text.name(), reporter);
     return result;
 }
 
