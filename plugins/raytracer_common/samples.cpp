@@ -2,6 +2,7 @@
 #include "raytracer_common/samples.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace arhost::raytracer_common {
