@@ -1,43 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/mesh.hpp"
 
+#include "scene/vertices.hpp"
+
 #include <arhost/scene.h>
 
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
+#include <array>
 #include <cstdint>
 #include <span>
 
 namespace arhost::scene {
 namespace {
 
-// Returns, for each vertex, the index of the first vertex at the same position. Uses a hash table with open
-// addressing.
+// Returns, for each vertex, the index of the first vertex at the same position.
 std::vector<std::uint32_t> welded(std::span<const glm::vec3> positions) {
-    std::vector<std::uint32_t> table(std::bit_ceil(positions.size() * 2), ARHOST_NONE), same(positions.size());
-    for (std::uint32_t i = 0; i < positions.size(); ++i) {
-        const glm::vec3 p = positions[i] + 0.f; // −0 becomes 0
-        std::uint64_t hash = std::bit_cast<std::uint32_t>(p.x) * 0x9e3779b97f4a7c15u ^
-                             std::bit_cast<std::uint32_t>(p.y) * 0xc2b2ae3d27d4eb4fu ^
-                             std::bit_cast<std::uint32_t>(p.z) * 0x165667b19e3779f9u;
-        hash ^= hash >> 32;
-        std::size_t slot = hash & (table.size() - 1);
-        while (table[slot] != ARHOST_NONE && positions[table[slot]] != positions[i])
-            slot = (slot + 1) & (table.size() - 1);
-        if (table[slot] == ARHOST_NONE)
-            table[slot] = i;
-        same[i] = table[slot];
-    }
-    return same;
+    return first_equal_vertices(positions.size(), [&](std::uint32_t vertex) {
+        const glm::vec3 &p = positions[vertex];
+        return std::array{p.x, p.y, p.z};
+    });
 }
 
-// Normalizes in double precision, because squared lengths in tiny meshes underflow in floats.
 glm::vec3 unit(const glm::dvec3 &v) {
-    const double length = glm::length(v);
-    return length > 0 && std::isfinite(length) ? glm::vec3(v / length) : glm::vec3(0);
+    return unit_or_0(v);
 }
 
 } // namespace

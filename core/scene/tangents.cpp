@@ -1,43 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/tangents.hpp"
 
-#include <glm/geometric.hpp>
+#include "scene/vertices.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cstring>
-#include <string_view>
-#include <unordered_map>
+#include <cmath>
 
 namespace arhost::scene {
 namespace {
-
-// Returns a number for each vertex that is the same for vertices of the same position, normal and texture
-// coordinates.
-std::vector<std::uint32_t> identities_of(const TriangleMesh &mesh, const glm::vec2 *texcoords) {
-    using Key = std::array<float, 8>;
-    struct Hash {
-        std::size_t operator()(const Key &key) const {
-            return std::hash<std::string_view>()({reinterpret_cast<const char *>(key.data()), sizeof key});
-        }
-    };
-    std::unordered_map<Key, std::uint32_t, Hash> known;
-    known.reserve(mesh.positions.size());
-    std::vector<std::uint32_t> identities;
-    identities.reserve(mesh.positions.size());
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-        const glm::vec3 &p = mesh.positions[i], &n = mesh.normals[i];
-        Key key{p.x, p.y, p.z, n.x, n.y, n.z, texcoords[i].x, texcoords[i].y};
-        for (float &number : key)
-            number += 0.f; // −0 becomes 0
-        identities.push_back(known.try_emplace(key, static_cast<std::uint32_t>(known.size())).first->second);
-    }
-    return identities;
-}
-
-glm::dvec3 unit_or_0(const glm::dvec3 &a) {
-    const double length = glm::length(a);
-    return length > 0 ? a / length : glm::dvec3(0);
-}
 
 // The direction in which u increases on a triangle, a unit vector or 0, and whether u and v are mirrored.
 struct Direction {
@@ -79,7 +50,11 @@ void add_tangents(TriangleMesh &mesh, std::size_t texcoord_set) {
         return;
     const std::size_t count = mesh.positions.size();
     const glm::vec2 *texcoords = mesh.texcoords.data() + texcoord_set * count;
-    const std::vector<std::uint32_t> identity = identities_of(mesh, texcoords);
+    const std::vector<std::uint32_t> first = first_equal_vertices(count, [&](std::uint32_t vertex) {
+        const glm::vec3 &p = mesh.positions[vertex], &n = mesh.normals[vertex];
+        const glm::vec2 &t = texcoords[vertex];
+        return std::array{p.x, p.y, p.z, n.x, n.y, n.z, t.x, t.y};
+    });
 
     // The sums for triangles that are not mirrored, and for those that are.
     std::array<std::vector<glm::dvec3>, 2> sums{std::vector<glm::dvec3>(count), std::vector<glm::dvec3>(count)};
@@ -97,7 +72,7 @@ void add_tangents(TriangleMesh &mesh, std::size_t texcoord_set) {
                                 glm::dvec3(mesh.positions[vertex]));
             };
             const double angle = std::acos(std::clamp(glm::dot(to(1), to(2)), -1.0, 1.0));
-            sums[direction.is_mirrored][identity[vertex]] += in_plane(direction.along_u) * angle;
+            sums[direction.is_mirrored][first[vertex]] += in_plane(direction.along_u) * angle;
         }
     }
 
@@ -111,7 +86,7 @@ void add_tangents(TriangleMesh &mesh, std::size_t texcoord_set) {
             if (number == static_cast<std::uint32_t>(-1)) {
                 number = static_cast<std::uint32_t>(sources.size());
                 sources.push_back(vertex);
-                const glm::vec3 tangent(unit_or_0(sums[mirrored[t]][identity[vertex]]));
+                const glm::vec3 tangent(unit_or_0(sums[mirrored[t]][first[vertex]]));
                 mesh.tangents.push_back(tangent == glm::vec3(0) ? glm::vec4(0)
                                                                 : glm::vec4(tangent, mirrored[t] ? -1 : 1));
             }

@@ -32,11 +32,9 @@ std::uint32_t Textures::add(const std::string &name, const char *kind, const Tex
     const auto [image, is_new] = images_.try_emplace(name + "\n" + kind);
     if (is_new) {
         TexelImage made = make(image_callbacks());
-        const std::uint64_t size = made.texels.size;
-        budget_.take(
-            (texel_count(made.width, made.height, levels_of(made)) - texel_count(made.width, made.height, 1)) *
-                (size / texel_count(made.width, made.height, 1)),
-            printable(name));
+        const std::uint64_t texels = texel_count(made.width, made.height, 1),
+                            of_all_levels = texel_count(made.width, made.height, levels_of(made));
+        budget_.take(made.texels.size / texels * (of_all_levels - texels), printable(name));
         add_levels(made);
         image->second = builder_.add_image(printable(name), std::move(made));
     }

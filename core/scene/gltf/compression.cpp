@@ -79,7 +79,9 @@ nlohmann::json plain_json(const nlohmann::json &json, const std::string &name) {
                                        {"byteLength", extension->at("byteLength").integer(1, size_limit)}};
     for (std::size_t i = 0; i < images.size(); ++i) { // tinygltf knows no data of the type image/webp
         const std::string uri = images[i].text_or("uri", ""), start = "data:image/";
-        if (const std::size_t end = uri.find(";base64,"); uri.starts_with(start) && end < start.size() + 20)
+        const bool is_known = uri.starts_with(start + "png;") || uri.starts_with(start + "jpeg;");
+        if (const std::size_t end = uri.find(";base64,");
+            uri.starts_with(start) && !is_known && end < start.size() + 20)
             plain["images"][i]["uri"] = "data:application/octet-stream" + uri.substr(end);
     }
     for (std::size_t i = 0; i < textures.size(); ++i)

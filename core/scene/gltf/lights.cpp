@@ -17,12 +17,11 @@ GltfLights::GltfLights(const nlohmann::json &json, const std::string &name) {
 }
 
 arhost_light GltfLights::at(const JsonNode &reference, const glm::dmat4 &world_from_node, double scale) const {
-    const auto index = reference.find("light");
-    if (!index)
-        reference.fail("needs the index of a light");
-    if (static_cast<std::size_t>(index->index()) >= lights_.size())
-        index->fail("the file has only " + std::to_string(lights_.size()) + " lights");
-    const JsonNode &from = lights_[static_cast<std::size_t>(index->index())];
+    const JsonNode index = reference.at("light");
+    const auto number = static_cast<std::size_t>(index.index());
+    if (number >= lights_.size())
+        index.fail("the file has only " + std::to_string(lights_.size()) + " lights");
+    const JsonNode &from = lights_[number];
     const std::string type = from.text_or("type", "");
     if (type != "point" && type != "spot" && type != "directional")
         from.find("type").value_or(from).fail("must be point, spot or directional");
