@@ -181,6 +181,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
                     texture.filter == ARHOST_TEXEL_FILTER_NEAREST, texture.texcoord_set});
         std::ranges::copy(texture.image_from_texcoord, to.image_from_texcoord);
         to.level_count = static_cast<std::int32_t>(image.level_count);
+        view_.has_image_levels |= image.level_count > 1;
         for (std::int32_t level = 1; level < to.level_count; ++level)
             to.first_of_level[level] = to.first_of_level[level - 1] +
                                        std::max(to.width >> (level - 1), 1) * std::max(to.height >> (level - 1), 1);

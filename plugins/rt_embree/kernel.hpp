@@ -109,7 +109,8 @@ struct Scene {
     bool has_gloss;        // whether a catcher may mirror virtual objects
     bool has_several_real; // several catchers or occluders
     bool has_area_lights;
-    float ray_angle; // width of a sample from the eye, in units of its distance; 0: textures are not filtered
+    bool has_image_levels; // of any texture
+    float ray_angle;       // width of a sample from the eye, in units of its distance; 0: textures are not filtered
     std::uint32_t random_seed; // of the frame, for hits of translucent surfaces
     bool has_ambient;          // `ambient` is not black
     bool has_background;       // a background that is not black, and no environment

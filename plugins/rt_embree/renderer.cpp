@@ -365,7 +365,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 [](const void *of) { return static_cast<const Progress *>(of)->goes_on(); },
                 &progress};
     frame.scene.random_seed = first_random;
-    if (lights_) // the path integrator
+    if (lights_ && frame.scene.has_image_levels) // with the path integrator
         frame.scene.ray_angle = arhost::raytracer_common::ray_angle(intrinsics_, samples_.size());
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)

@@ -178,13 +178,12 @@ struct RoughReflection {
 
 // Bends the normals of rough virtual surfaces so that they reflect the eye's rays away from the surface.
 ARHOST_INLINE void bend_normals(Surface &s, Vec3 to_eye) {
-    s.normal = select(s.is_rough & ~s.is_real, reflecting_normal(s.normal, s.geometric_normal, to_eye), s.normal);
+    const Bool bends = s.is_rough & ~s.is_real;
+    s.normal = select(bends, reflecting_normal(s.normal, s.geometric_normal, to_eye), s.normal);
     if (s.any_coat)
-        s.coat_normal = reflecting_normal(s.coat_normal, s.geometric_normal, to_eye);
-    if (s.any_anisotropic) {
-        s.tangent = tangent_of(s.normal, s.tangent, tangent_axis(s.normal));
-        s.bitangent = cross(s.normal, s.tangent);
-    }
+        s.coat_normal = select(bends, reflecting_normal(s.coat_normal, s.geometric_normal, to_eye), s.coat_normal);
+    if (s.any_anisotropic)
+        turn_tangents(s);
 }
 
 // Microfacets of a rough surface. Vectors are in world coordinates.

@@ -104,11 +104,12 @@ ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &obje
 }
 
 // Returns the area that a sample from the eye covers on the triangles, as a multiple of half the area of the
-// triangle. `distance`: from the eye, mm; `facing`: cosine of the angle between the ray and the normal.
+// triangle. `distance`: from the eye, mm; `facet`: the geometric normal and `direction`: of the ray, of any length.
 ARHOST_INLINE Float footprint_of(const Scene &scene, const Object &object, const RTCHit16 &hit, Bool here,
-                                 Float distance, Float facing) {
+                                 Float distance, Vec3 facet, Vec3 direction) {
     if (!object.texcoords || scene.ray_angle == 0)
         return Float(0.0f);
+    const Float facing = dot(normalize_or(facet, -direction), normalize(direction));
     const Corners corners = corners_of(object, hit, here);
     Vec3 position[3];
     for (int i = 0; i < 3; ++i)
@@ -235,6 +236,12 @@ ARHOST_INLINE Float below_coat(const Surface &s, Vec3 to_eye) {
     return Float(1.0f) - s.coat * coat_reflectance(dot(s.coat_normal, to_eye));
 }
 
+// Makes the tangents of an anisotropic surface orthogonal to its normal.
+ARHOST_INLINE void turn_tangents(Surface &s) {
+    s.tangent = tangent_of(s.normal, s.tangent, tangent_axis(s.normal));
+    s.bitangent = cross(s.normal, s.tangent);
+}
+
 // Replaces the reflectances of the share `film` of a surface by those under a thin film. `cosine`: of the angle
 // between the normal and the eye, whose film all microfacets have.
 ARHOST_INLINE void add_film(Surface &s, Float film, Float index, Float thickness_nm, Float cosine) {
@@ -291,8 +298,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
             normal = transform(object.normal_transform, normal);
         }
         const Vec3 vertex_normal = normal;
-        const Float footprint = footprint_of(scene, object, hit, here, s.distance,
-                                             dot(normalize_or(geometric, -direction), normalize(direction)));
+        const Float footprint = footprint_of(scene, object, hit, here, s.distance, geometric, direction);
         if (object.material->model == ARHOST_MATERIAL_METALLIC_ROUGHNESS &&
             object.material->normal_texture != ARHOST_NONE && object.texcoords)
             normal = mapped_normal(scene, object, object.material->normal_texture, object.material->normal_scale,
@@ -484,8 +490,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     }
     if (s.any_anisotropic) {
         s.tangent_alpha = max(s.tangent_alpha, s.alpha);
-        s.tangent = tangent_of(s.normal, s.tangent, tangent_axis(s.normal));
-        s.bitangent = cross(s.normal, s.tangent);
+        turn_tangents(s);
     }
     if (any_film)
         add_film(s, film, film_index, film_nm, -dot(s.normal, normalize(direction)));
